@@ -1,0 +1,52 @@
+"""What the user did wrong, said on one line: what, where, the value, what is allowed, the remedy."""
+
+from __future__ import annotations
+
+
+class PneumoError(Exception):
+    """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
+
+
+class InputError(PneumoError):
+    """A file, key or value that cannot be used.
+
+    Parameters
+    ----------
+    what : the problem, in words
+    where : file, topic or option it was found in
+    key : name of the entry, if there is one
+    value : the offending value, shown as it was read
+    allowed : what would have been accepted, with its unit
+    remedy : what to do next
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        where: object = None,
+        key: str | None = None,
+        value: object = None,
+        allowed: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.what, self.where, self.key = what, where, key
+        self.value, self.allowed, self.remedy = value, allowed, remedy
+        super().__init__(self._line())
+
+    def _line(self) -> str:
+        parts = [f"{self.where}: " if self.where is not None else "", self.what]
+        if self.key is not None:
+            parts.append(f", key '{self.key}'")
+        if self.value is not None:
+            parts.append(f", value {_short(self.value)}")
+        if self.allowed is not None:
+            parts.append(f"; allowed: {self.allowed}")
+        if self.remedy is not None:
+            parts.append(f"; {self.remedy}")
+        return " ".join("".join(parts).split())
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

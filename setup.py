@@ -1,0 +1,85 @@
+"""Build description: an ament_python package that pip installs as well."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "pneumo_ros"
+
+# Every node is an executable of its own: `ros2 run pneumo_ros <name>`, and a console script under pip.
+NODES = ["road_profile", "plant", "estimator", "controller", "session_recorder"]
+
+# One list of wheels for those who have no ROS 2 installed; a sourced ROS keeps its own.
+ROS_WHEELS = [
+    "ros-jazzy-rclpy>=7.1,<8",
+    "ros-rmw-fastrtps-cpp>=8.4,<9",
+    "ros-jazzy-std-msgs>=5.3,<6",
+    "ros-jazzy-sensor-msgs>=5.3,<6",
+    "ros-jazzy-geometry-msgs>=5.3,<6",
+    "ros-jazzy-diagnostic-msgs>=5.3,<6",
+    "ros-jazzy-std-srvs>=5.3,<6",
+]
+
+
+def share(pattern: str) -> list[str]:
+    """Files that are installed below share/."""
+    return [str(path) for path in sorted(Path().glob(pattern)) if path.is_file()]
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Active pneumatic half-car rig: simulate, drive, log, replay, and diagnose the sim-to-real gap",
+    license="Apache-2.0",
+    author="pneumo_ros maintainers",
+    maintainer="pneumo_ros maintainers",
+    maintainer_email="maintainers@pneumo-ros.example",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    python_requires=">=3.10,<3.14",
+    install_requires=[
+        "setuptools",
+        "numpy>=1.26,<3",
+        "scipy>=1.11,<2",
+        "numba>=0.59,<1",
+        "PyYAML>=6,<7",
+        "mcap>=1.2,<2",
+        "zstandard>=0.22,<1",
+        "rosbags>=0.10,<0.12",
+        "typer>=0.12,<1",
+        "rich>=13,<16",
+        "matplotlib>=3.8,<4",
+        "Jinja2>=3.1,<4",
+        "cobs>=1.2,<2",
+        "pyserial>=3.5,<4",
+        "fastcrc>=0.3,<1",
+    ],
+    extras_require={
+        "ros": ROS_WHEELS,
+        "cluster": ["distributed>=2024.1"],
+        "parquet": ["pyarrow>=15"],
+        "dev": [
+            "pytest>=8",
+            "pytest-timeout>=2.3",
+            "hypothesis>=6.100",
+            "ruff>=0.6",
+            "mypy>=1.11",
+            "types-PyYAML>=6",
+            "mcap-ros2-support>=0.5",
+            "pandas>=2.1",
+        ],
+    },
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", share("launch/*.py")),
+        (f"share/{NAME}/config", share("config/*")),
+        (f"share/{NAME}/config/tables", share("config/tables/*")),
+        (f"share/{NAME}/config/calibration", share("config/calibration/*")),
+        (f"share/{NAME}/config/layouts", share("config/layouts/*")),
+    ],
+    zip_safe=False,
+    entry_points={
+        "console_scripts": ["pneumo = pneumo_ros.cli.main:main"]
+        + [f"{node} = pneumo_ros.nodes.{node}:main" for node in NODES],
+    },
+)

@@ -1,0 +1,19 @@
+"""Shared helpers of the tests: where the reference data is, and a clear word when it is not there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Folder with the reference tables, check values and sample logs that do not ship with the package."""
+    folder = Path(os.environ.get("PNEUMO_SHARED", ROOT.parent / "shared"))
+    if not folder.is_dir():
+        pytest.skip(f"reference data not found at {folder}; set PNEUMO_SHARED to its folder")
+    return folder
