@@ -1,107 +1,100 @@
-"""One declaration of a settable parameter, from which nodes, command line, checks and docs are made."""
+"""Declared parameters: one table entry says everything a node, the command line and the docs need to know of a value."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Union
 
 from pneumo_ros.errors import InputError
 
-Value = Union[bool, int, float, str]  # noqa: UP007 - evaluated at run time
-ParameterValues = dict[str, Value]
+Value = float | int | str | bool
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a node, an estimator or a controller.
+    """A value that can be set from outside.
 
     Attributes
     ----------
-    name : as it is set, lower case with dots or underscores; carries the unit where that is not SI
-    default : also fixes the type (bool, int, float or str)
-    unit : SI unit, '1' for a ratio, '' for text and switches
-    description : one sentence
+    name : with its unit as a suffix wherever the unit is not SI
+    default : its type (float, int, str, bool) is the parameter's type
+    unit : "" for words and flags, "1" for pure numbers
+    description : one sentence, what it does and how to choose it
     low, high : inclusive range of a number
-    choices : allowed texts; empty for any
-    read_only : True if it cannot change while the node runs
+    choices : allowed words
+    read_only : True if it cannot change while a session runs
     """
 
     name: str
     default: Value
     unit: str
     description: str
-    low: float | None = None
-    high: float | None = None
+    low: float = -math.inf
+    high: float = math.inf
     choices: tuple[str, ...] = ()
-    read_only: bool = True
+    read_only: bool = False
 
     @property
     def allowed(self) -> str:
-        """The range in words, with its unit."""
+        """The range in words, for errors and tables."""
         if self.choices:
             return ", ".join(self.choices)
         if isinstance(self.default, bool):
-            return "true, false"
+            return "true or false"
         if isinstance(self.default, str):
-            return "a text"
-        low = "-inf" if self.low is None else f"{self.low:g}"
-        high = "inf" if self.high is None else f"{self.high:g}"
-        return f"{low} to {high} {self.unit}".strip()
+            return "text"
+        return f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
 
-    def check(self, raw: object, where: object = None) -> Value:
-        """The value in the declared type.
-
-        Raises
-        ------
-        InputError
-            naming where, key, value, allowed range and remedy.
-        """
-        value = self._typed(raw)
-        if value is None:
+    def checked(self, raw: object, where: object = None) -> Value:
+        """``raw`` as this parameter's type, or an :class:`InputError` that names range and remedy."""
+        value = _as_type(raw, self.default)
+        if value is None or not self._accepts(value):
             raise InputError(
-                f"not a {type(self.default).__name__}", where=where, key=self.name, value=raw,
-                allowed=self.allowed, remedy="correct the type",
-            )  # fmt: skip
-        inside = not self.choices or value in self.choices
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            inside = (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
-        if not inside:
-            raise InputError(
-                "value out of range", where=where, key=self.name, value=raw, allowed=self.allowed,
-                remedy="choose a value inside",
-            )  # fmt: skip
+                "parameter cannot take this value",
+                where=where,
+                key=self.name,
+                value=raw,
+                allowed=self.allowed,
+                remedy=f"default is {self.default!r}",
+            )
         return value
 
-    def _typed(self, raw: object) -> Value | None:
-        if isinstance(self.default, bool) or isinstance(raw, bool):
-            return raw if isinstance(self.default, bool) and isinstance(raw, bool) else None
-        if isinstance(self.default, float) and isinstance(raw, int | float):
-            return float(raw) if math.isfinite(raw) else None
-        if isinstance(self.default, int) and isinstance(raw, int):
-            return raw
-        return raw if isinstance(self.default, str) and isinstance(raw, str) else None
+    def _accepts(self, value: Value) -> bool:
+        if self.choices:
+            return value in self.choices
+        return isinstance(value, str | bool) or self.low <= value <= self.high
 
 
-def defaults(table: Iterable[Parameter]) -> ParameterValues:
-    """Name -> default of a table."""
-    return {p.name: p.default for p in table}
-
-
-def check_all(table: Iterable[Parameter], values: Mapping[str, object], where: object = None) -> ParameterValues:
-    """Defaults overridden by checked ``values``.
+def settings(
+    table: Iterable[Parameter], given: Mapping[str, object] | None = None, where: object = None
+) -> dict[str, Value]:
+    """Complete, checked values: the defaults of ``table`` with ``given`` laid over them.
 
     Raises
     ------
     InputError
-        for an unknown key or a value that is not allowed.
+        if a name is not in the table or a value is out of range.
     """
-    known = {p.name: p for p in table}
-    out = defaults(known.values())
-    for key, raw in values.items():
-        if key not in known:
-            raise InputError("unknown parameter", where=where, key=key, value=raw, allowed=", ".join(sorted(known)),
-                             remedy="correct the name or remove it")  # fmt: skip
-        out[key] = known[key].check(raw, where)
-    return out
+    known = {parameter.name: parameter for parameter in table}
+    for name in given or {}:
+        if name not in known:
+            raise InputError(
+                "unknown parameter", where=where, key=name, allowed=", ".join(known), remedy="correct or remove it"
+            )
+    return {
+        name: parameter.checked(given[name], where) if given and name in given else parameter.default
+        for name, parameter in known.items()
+    }
+
+
+def _as_type(raw: object, like: Value) -> Value | None:
+    if isinstance(like, bool) or isinstance(raw, bool):
+        return raw if isinstance(raw, bool) and isinstance(like, bool) else None
+    if isinstance(like, str):
+        return raw if isinstance(raw, str) else None
+    if not isinstance(raw, int | float) or not math.isfinite(raw):
+        return None
+    if isinstance(like, int):
+        return int(raw) if float(raw).is_integer() else None
+    return float(raw)
