@@ -63,10 +63,14 @@ def topics_of(log: Log) -> tuple[dict[str, TopicData], float]:
         raw[topic] = (scalar.stamp_ns, scalar.log_time_ns, {"pressure": scalar.value.astype(float)})
     origin = min((int(stamp[0]) for stamp, _, _ in raw.values()), default=0)
     topics = {
-        topic: TopicData((stamp - origin) * 1e-9, columns, (received - origin) * 1e-9)
+        topic: TopicData(_seconds(stamp, origin), columns, _seconds(received, origin))
         for topic, (stamp, received, columns) in raw.items()
     }
     return topics, origin * 1e-9
+
+
+def _seconds(stamp_ns: NDArray[np.int64], origin_ns: int) -> NDArray[np.float64]:
+    return np.asarray((stamp_ns - origin_ns) * 1e-9, dtype=float)
 
 
 def _holds(log: Log, topic: str) -> bool:
