@@ -1,1 +1,1 @@
-"""The gap between a log and the model: where it lies, which unmodelled effect makes it, how far it shrinks."""
+"""The sim-to-real gap from a log: where it lies, which unmodelled effect makes it, how far it shrinks."""
