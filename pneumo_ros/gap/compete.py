@@ -2,20 +2,19 @@
 
 Cheap screening first (:mod:`pneumo_ros.gap.screen`), short fits of what promises most, then the best to convergence, from
 several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on top of each leading
-single, where the first effect no longer hides it.
+single, where the first effect no longer hides it. Whenever the best fit so far is good enough to time the command's jumps
+by (:mod:`pneumo_ros.gap.events`), they are timed and the finalists fitted again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 
-import numpy as np
-
+from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
-from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Candidate, Part, Problem
-from pneumo_ros.gap.screen import Promise, all_parts, promises, start_values, trials
+from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials
 
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
@@ -45,109 +44,135 @@ class Effort:
     long: int = 8
 
 
-@dataclass(frozen=True)
+@dataclass
 class Contest:
-    """All fits that were made, the refit apart.
+    """The state of a competition; ends as its result.
 
     Attributes
     ----------
+    problem : the problem as last timed
     refit : the nominal structure re-estimated
-    fits : singles and pairs, best training cost first; only the finalists have converged
-    finalists : of those, the ones that did
-    promised : screening of the singles, for the report
+    singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
+    promised : screening of the singles at the refit, for the report
+    lost : labels of candidates whose fit diverged
     """
 
+    problem: Problem
     refit: Fit
-    fits: tuple[Fit, ...]
-    finalists: tuple[Fit, ...]
-    promised: tuple[Promise, ...]
+    effort: Effort
+    progress: Progress
+    singles: list[Fit] = field(default_factory=list)
+    pairs: list[Fit] = field(default_factory=list)
+    promised: list[Promise] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+
+    @property
+    def finalists(self) -> list[Fit]:
+        """Converged singles and pairs."""
+        return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
+
+    @property
+    def best(self) -> Fit:
+        """Lowest training cost of all."""
+        return min([self.refit, *self.finalists], key=lambda f: f.cost)
 
 
-def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress, warm: Fit | None = None) -> Contest:
-    """Run the competition.
-
-    Parameters
-    ----------
-    pairs : look for pairs as well
-    progress : called with the share done
-    warm : a refit to start from
-    """
+def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Contest:
+    """Run the competition; ``progress`` is called with the share done."""
     progress(0.0, "re-estimating the nominal model")
     nominal = Candidate()
-    refit = _with_jacobian(problem, fit(problem, nominal, problem.start(nominal, None if warm is None else warm.x, ())))
-    progress(0.05, "screening effects")
-    found = trials(problem, refit, all_parts(problem))
-    promised = promises(problem, refit, found)
-    singles = _short_fits(problem, refit, _varied(promised, effort.singles), effort, progress, (0.1, 0.4))
-    finalists = [_finish(problem, one, effort) for one in singles[: effort.finalists]]
-    finalists.sort(key=lambda f: f.cost)
-    fits = finalists + singles[effort.finalists :]
-    if pairs and finalists:
-        progress(0.6, "screening pairs")
-        paired = _pair_fits(problem, refit, finalists, found, effort, progress)
-        ended = [_finish(problem, one, effort) for one in paired[: effort.pair_finalists]]
-        finalists, fits = finalists + ended, fits + ended + paired[effort.pair_finalists :]
-    progress(0.9, "selecting")
-    return Contest(refit, tuple(sorted(fits, key=lambda f: f.cost)), tuple(finalists), tuple(promised))
+    contest = Contest(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), effort, progress)
+    _time_jumps(contest)
+    _run_singles(contest)
+    _time_jumps(contest)
+    if pairs and contest.singles:
+        _run_pairs(contest)
+        _time_jumps(contest)
+    return contest
 
 
-def _varied(promised: Sequence[Promise], count: int) -> list[Promise]:
-    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their chance."""
-    taken: list[Promise] = []
-    for promise in promised:
-        same = sum(p.parts[0][0] == promise.parts[0][0] for p in taken)
-        if same < 3:
-            taken.append(promise)
-    return taken[:count]
+def _time_jumps(contest: Contest) -> None:
+    """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
+    moved = timed(contest.problem, contest.best)
+    if moved is contest.problem:
+        return
+    contest.problem = moved
+    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.finalists]
+    contest.refit = fit(moved, Candidate(), contest.refit.x, contest.refit.jacobian)
+    singles, pairs = contest.effort.finalists, contest.effort.pair_finalists
+    done = len(contest.singles[:singles])
+    contest.singles = _by_cost(again[:done]) + contest.singles[singles:]
+    contest.pairs = _by_cost(again[done:]) + contest.pairs[pairs:]
 
 
-def _short_fits(
-    problem: Problem, base: Fit, chosen: Sequence[Promise], effort: Effort, progress: Progress, span: tuple[float, float]
-) -> list[Fit]:
-    out = []
-    for k, promise in enumerate(chosen):
-        candidate = Candidate((*base.candidate.parts, *promise.parts))
-        progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
-        values = [*problem.values(base.candidate, base.x), *promise.values]
-        start = problem.start(candidate, base.x[: problem.fixed], values)
-        out.append(fit(problem, candidate, start, base.jacobian, iterations=effort.short))
-    return sorted((f for f in out if not f.diverged), key=lambda f: f.cost)
+def _run_singles(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.05, "screening effects")
+    found = trials(problem, contest.refit, all_parts(problem))
+    contest.promised = promises(problem, contest.refit, found)
+    short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles), (0.1, 0.4))
+    ended = [_finish(problem, one, effort) for one in short[: effort.finalists]]
+    contest.singles = _by_cost(ended) + short[effort.finalists :]
 
 
-def _pair_fits(
-    problem: Problem, refit: Fit, singles: Sequence[Fit], found: Sequence, effort: Effort, progress: Progress
-) -> list[Fit]:
+def _run_pairs(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.6, "screening pairs")
     seen: set[frozenset[Part]] = set()
-    out: list[Fit] = []
 
     def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
         fresh = [p for p in promised if frozenset((*base, *p.parts)) not in seen][:count]
         seen.update(frozenset((*base, *p.parts)) for p in fresh)
         return fresh
 
-    leaders = singles[: effort.leaders]
-    for k, leader in enumerate(leaders):
-        leader = _with_jacobian(problem, leader)
-        (first, site), *_ = leader.candidate.parts
-        others = [p for p in all_parts(problem) if p[0] != first or (p[1] != site and "both" not in (site, p[1]))]
+    short: list[Fit] = []
+    for k, single in enumerate(contest.singles[: effort.leaders]):
+        leader = with_jacobian(problem, single)
+        part = leader.candidate.parts[0]
+        others = [p for p in all_parts(problem) if compatible((part, p))]
         promised = promises(problem, leader, trials(problem, leader, others))
-        chosen = unseen(promised, leader.candidate.parts, effort.seconds)
-        out += _short_fits(problem, leader, chosen, effort, progress, (0.65 + 0.05 * k, 0.7 + 0.05 * k))
-    blind = unseen(promises(problem, refit, found, pairs=True), (), effort.blind_pairs)
-    out += _short_fits(problem, refit, blind, effort, progress, (0.8, 0.85))
-    return sorted(out, key=lambda f: f.cost)
+        span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
+        short += _short_fits(contest, leader, unseen(promised, (part,), effort.seconds), span)
+    found = trials(problem, contest.refit, all_parts(problem))
+    blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
+    short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
+    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
+    contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+
+
+def _varied(promised: Sequence[Promise], count: int) -> list[Promise]:
+    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their chance."""
+    taken: list[Promise] = []
+    for promise in promised:
+        if sum(p.parts[0][0] == promise.parts[0][0] for p in taken) < 3:
+            taken.append(promise)
+    return taken[:count]
+
+
+def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
+    problem, out = contest.problem, []
+    for k, promise in enumerate(chosen):
+        candidate = Candidate((*base.candidate.parts, *promise.parts))
+        contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
+        values = [*problem.values(base.candidate, base.x), *promise.values]
+        start = problem.start(candidate, base.x[: problem.fixed], values)
+        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        if one.diverged:
+            contest.lost.append(candidate.label)
+        else:
+            out.append(one)
+    return _by_cost(out)
 
 
 def _finish(problem: Problem, short: Fit, effort: Effort) -> Fit:
-    """To convergence, from where the short fit ended and from its effects' other starts; the best of them."""
+    """To convergence, from where the short fit ended and from its effect's other shapes; the best of them."""
     best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
-    shapes = [k for k, p in enumerate(problem.effect_parameters(short.candidate)) if not p.size]
-    if not shapes or len(short.candidate.parts) > 1:
-        return best
     parameters = problem.effect_parameters(short.candidate)
+    if len(short.candidate.parts) > 1 or all(p.size for p in parameters):
+        return best
     for values in start_values(parameters)[2:]:
         kept = problem.values(best.candidate, best.x)
-        mixed = [v if not p.size else k for v, k, p in zip(values, kept, parameters, strict=True)]
+        mixed = [k if p.size else v for v, k, p in zip(values, kept, parameters, strict=True)]
         start = problem.start(short.candidate, best.x[: problem.fixed], mixed)
         other = fit(problem, short.candidate, start, best.jacobian, iterations=effort.short)
         if other.cost < best.cost - 1.0:
@@ -155,10 +180,10 @@ def _finish(problem: Problem, short: Fit, effort: Effort) -> Fit:
     return best
 
 
-def _with_jacobian(problem: Problem, state: Fit) -> Fit:
+def with_jacobian(problem: Problem, state: Fit) -> Fit:
+    """The fit with its sensitivities."""
     return state if state.jacobian is not None else fit(problem, state.candidate, state.x, iterations=1)
 
 
-def initial_columns(problem: Problem) -> Array:
-    """Indices of the initial-state unknowns."""
-    return np.arange(len(problem.model.parameters), problem.fixed)
+def _by_cost(fits: Iterable[Fit]) -> list[Fit]:
+    return sorted(fits, key=lambda f: f.cost)

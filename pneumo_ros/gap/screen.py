@@ -85,7 +85,7 @@ def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = 
     best: dict[tuple[Part, ...], Promise] = {}
     for members in combinations(range(len(found)), 2) if pairs else product(range(len(found))):
         parts = tuple(found[m].part for m in members)
-        if pairs and not _compatible(parts):
+        if pairs and not compatible(parts):
             continue
         signed = np.array([_signed(problem, found[m]) for m in members])
         share, sizes = _explained(gram, with_residual, members, total, signed)
@@ -98,7 +98,7 @@ def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = 
 _NOTHING = Promise((), (), 0.0)
 
 
-def _compatible(parts: tuple[Part, ...]) -> bool:
+def compatible(parts: tuple[Part, ...]) -> bool:
     """Two sites of one effect only where they do not overlap."""
     (first, site), (second, other) = parts
     return first != second or (site != other and "both" not in (site, other))
