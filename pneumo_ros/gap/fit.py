@@ -21,8 +21,10 @@ from pneumo_ros.gap.problem import Candidate, Problem
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
 HUBER = 4.0  # robust sigmas
 STEP = 0.02  # forward difference in scaled units
-TOLERANCE = 2e-3  # of the cost; a diagnosis compares costs that differ by whole units
-MOST_DAMPING = 1e6
+TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
+NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
+COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
+START_DAMPING, MOST_DAMPING = 1e-4, 1e6
 
 
 @dataclass(frozen=True)
@@ -52,15 +54,15 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Array, x: Array, fixed: int, sigma: float | None = None) -> float:
+def cost_of(residual: Array, rows: Array | slice, x: Array, fixed: int) -> float:
     """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
     r = residual[rows]
     if not np.all(np.isfinite(r)):
         return np.inf
-    limit = HUBER * robust_scale(r) if sigma is None else HUBER * sigma
+    limit = HUBER * robust_scale(r)
     magnitude = np.abs(r)
     rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
-    return float(r.size / CORRELATION * np.log(0.05 + rho.mean()) + x[:fixed] @ x[:fixed])
+    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + x[:fixed] @ x[:fixed])
 
 
 def robust_scale(residual: Array) -> float:
@@ -74,42 +76,35 @@ def fit(
     start: Array,
     jacobian: Array | None = None,
     rows: Array | None = None,
-    iterations: int = 8,
-    fresh: bool = False,
+    iterations: int = 10,
 ) -> Fit:
     """Best unknowns from one start.
 
     Parameters
     ----------
     start : scaled unknowns
-    jacobian : (n, C, >= fixed) sensitivities whose fixed columns may be taken over
+    jacobian : (n, C, >= fixed) sensitivities whose fixed columns serve the first step
     rows : fitted samples; the problem's by default
-    fresh : compute every column in every iteration
     """
     rows = problem.fitted if rows is None else rows
-    low, high = problem.bounds(candidate)
-    x = np.clip(start, low, high)
-    state = _evaluate(problem, candidate, x, rows)
+    bounds = problem.bounds(candidate)
+    state = _evaluate(problem, candidate, np.clip(start, *bounds), rows)
     if state.diverged:
         return state
-    fixed_columns = None if jacobian is None or fresh else jacobian[:, :, : problem.fixed]
-    damping, stale = 1e-3, fixed_columns is not None
+    borrowed = None if jacobian is None else jacobian[:, :, : problem.fixed]
+    damping, failed = START_DAMPING, False
     for _ in range(iterations):
-        columns = _jacobian(problem, state, fixed_columns)
-        state = replace(state, jacobian=columns, simulations=state.simulations + _spent(columns, fixed_columns))
-        better, damping = _step(problem, state, rows, low, high, damping)
-        gained = state.cost - better.cost
-        if gained > TOLERANCE:
-            state = replace(better, jacobian=columns)
-        if gained <= TOLERANCE * 50.0 and stale and not fresh:
-            fixed_columns, stale = None, False  # the borrowed sensitivities have given what they can
-            if gained <= TOLERANCE:
-                continue
-        elif gained <= TOLERANCE:
-            break
-        if not stale:
-            fixed_columns = columns[:, :, : problem.fixed] if not fresh else None
-            stale = fixed_columns is not None
+        columns = _jacobian(problem, state, borrowed)
+        state = replace(state, jacobian=columns, simulations=state.simulations + _spent(columns, borrowed))
+        better, damping = _step(problem, state, rows, bounds, damping)
+        gained, moved = state.cost - better.cost, float(np.max(np.abs(better.x - state.x)))
+        state = replace(better, jacobian=columns)
+        if gained < TOLERANCE:
+            if borrowed is None or failed:
+                break
+            failed = True
+        borrowed = columns[:, :, : problem.fixed] if moved < NEAR and gained >= TOLERANCE else None
+        damping = damping if gained >= TOLERANCE else START_DAMPING
     return state
 
 
@@ -138,30 +133,39 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     return columns
 
 
-def _step(problem: Problem, state: Fit, rows: Array, low: Array, high: Array, damping: float) -> tuple[Fit, float]:
-    """The best of a few damped steps."""
-    r = state.residual[rows]
-    limit = HUBER * robust_scale(r)
-    w = np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-12))
-    rho = np.where(w < 1.0, limit * (2.0 * np.abs(r) - limit), r * r)
-    strength = 1.0 / (CORRELATION * (0.05 + rho.mean()))
-    assert state.jacobian is not None
-    A = (state.jacobian[rows] * np.sqrt(w)[:, :, None]).reshape(-1, len(state.x))
-    prior = np.zeros(len(state.x))
-    prior[: problem.fixed] = 1.0
-    H = strength * (A.T @ A) + np.diag(prior)
-    g = strength * (A.T @ (r * np.sqrt(w)).ravel()) + prior * state.x
-    best = state
+def _step(
+    problem: Problem, state: Fit, rows: Array, bounds: tuple[Array, Array], damping: float
+) -> tuple[Fit, float]:
+    """The first of a few ever more damped steps that gains."""
+    low, high = bounds
+    H, g = normal_equations(problem, state, rows)
     for _ in range(5):
-        move = bounded_newton(H + damping * np.diag(np.diag(H) + 1e-9), g, low - state.x, high - state.x)
+        move = bounded_newton(H + damping * np.diag(np.diag(H)), g, low - state.x, high - state.x)
         if np.max(np.abs(move)) < 1e-6:
             break
-        trial = _evaluate(problem, state.candidate, state.x + move, rows, best.simulations)
-        best = replace(best, simulations=trial.simulations)
+        trial = _evaluate(problem, state.candidate, state.x + move, rows, state.simulations)
         if trial.cost < state.cost:
             return trial, max(damping / 10.0, 1e-6)
-        damping = min(damping * 10.0, MOST_DAMPING)
-    return best, damping
+        state = replace(state, simulations=trial.simulations)
+        damping = min(damping * 30.0, MOST_DAMPING)
+    return state, damping
+
+
+def normal_equations(problem: Problem, state: Fit, rows: Array) -> tuple[Array, Array]:
+    """Curvature and gradient of half the cost at a fit that has its jacobian: (m, m) and (m,)."""
+    assert state.jacobian is not None
+    r = state.residual[rows]
+    limit = HUBER * robust_scale(r)
+    magnitude = np.abs(r)
+    w = np.minimum(1.0, limit / np.maximum(magnitude, 1e-12))
+    rho = np.where(w < 1.0, limit * (2.0 * magnitude - limit), r * r)
+    strength = 1.0 / (CORRELATION * (COST_FLOOR + rho.mean()))
+    root = np.sqrt(w)
+    A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
+    prior = np.zeros(len(state.x))
+    prior[: problem.fixed] = 1.0
+    H = strength * (A.T @ A) + np.diag(prior + 1e-9)
+    return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
 
 
 def bounded_newton(H: Array, g: Array, low: Array, high: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from pneumo_ros.gap.signals import Signals
 
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
+JUMP = 12.0  # medians of the command's change from row to row
+SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
 _NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 # Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each.
@@ -161,6 +163,24 @@ class RigModel:
         held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
         on, values = self._switches(terms)
         return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+
+    def events(self, record: Signals) -> list[tuple[int, int]]:
+        """Jumps of the inlet commands (row, column); none where the command moves all the time."""
+        found = []
+        for column in (0, 1):
+            steps = np.abs(np.diff(record.commands[:, column]))
+            limit = max(JUMP * float(np.median(steps)), 0.02 * float(np.ptp(record.commands[:, column])), 1e-12)
+            rows = np.flatnonzero(steps > limit) + 1
+            if len(rows) < SPARSE * len(steps):
+                found += [(int(row), column) for row in rows]
+        return found
+
+    def led(self, record: Signals, events: list[tuple[int, int]], lead: Array) -> Signals:
+        """The record with jumps ``lead`` samples earlier: the row before takes that share of the jump."""
+        commands = record.commands.copy()
+        for (row, column), share in zip(events, lead, strict=True):
+            commands[row - 1, column] += share * (record.commands[row, column] - record.commands[row - 1, column])
+        return replace(record, commands=commands)
 
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""
