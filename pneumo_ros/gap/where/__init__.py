@@ -4,5 +4,7 @@ from pneumo_ros.gap.where.conditional import conditional_gaps as conditional_gap
 from pneumo_ros.gap.where.habitat import Habitat as Habitat
 from pneumo_ros.gap.where.habitat import habitat as habitat
 from pneumo_ros.gap.where.locate import Location as Location
+from pneumo_ros.gap.where.locate import Start as Start
 from pneumo_ros.gap.where.locate import locate as locate
+from pneumo_ros.gap.where.replay import place_gaps as place_gaps
 from pneumo_ros.gap.where.replay import predict_located as predict_located

@@ -1,8 +1,8 @@
 """Conditional runs: one subsystem simulated, the others fed from measurement.
 
 A subsystem whose own run stays close although the whole drifts off is sound; one that leaves the log while everything
-around it is measured holds (part of) the fault. Rates of the fed states are smoothed derivatives: they only feed damping
-and volume change of the simulated subsystem.
+around it is measured holds (part of) the fault. Rates of the fed states are smoothed derivatives: they only feed
+damping and volume change of the simulated subsystem.
 """
 
 from __future__ import annotations

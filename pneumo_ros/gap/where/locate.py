@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.gap.held_out import free_run
+from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
@@ -30,6 +32,40 @@ BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's pe
 
 
 @dataclass(frozen=True)
+class Start:
+    """The model that the search starts from: nominal by default.
+
+    Attributes
+    ----------
+    nuisance : (P,) parameter values already fitted, or None
+    active : effects already in the model
+    """
+
+    nuisance: Array | None = None
+    active: tuple[Active, ...] = ()
+
+    @property
+    def nominal(self) -> bool:
+        """Whether nothing has been fitted yet."""
+        return self.nuisance is None and not self.active
+
+    def predict(self, model: RigModel, signals: Signals) -> Array:
+        """(N, 6) the model's free run of a log."""
+        return free_run(model, signals, self.values(model, np.zeros(len(model.parameters))), self.active)
+
+    def offset(self, model: RigModel) -> Array:
+        """(P,) standard deviations that the parameters are from nominal."""
+        if self.nuisance is None:
+            return np.zeros(len(model.parameters))
+        return np.array([(v - p.nominal) / p.std for v, p in zip(self.nuisance, model.parameters, strict=True)])
+
+    def values(self, model: RigModel, sigmas: Array) -> Array:
+        """(P,) parameter values, ``sigmas`` standard deviations from the start's."""
+        own = [p.nominal for p in model.parameters] if self.nuisance is None else self.nuisance
+        return np.asarray(own, dtype=float) + sigmas * np.array([p.std for p in model.parameters])
+
+
+@dataclass(frozen=True)
 class Location:
     """Where the gap lives.
 
@@ -43,7 +79,7 @@ class Location:
     level : rms residual in null standard deviations on the held-out log: ``nominal``, ``refit`` (parameters inside
         their tolerances), ``chosen`` and ``flexible`` (all places at once)
     equations : per equation the level (``nominal``, ``refit``, ``chosen``)
-    nuisance : (P,) parameters that go with ``chosen``, in standard deviations
+    nuisance : (P,) parameters that go with ``chosen``, in standard deviations from the start's
     coefficients : of every basis, zero outside ``chosen``
     designs : the fitted logs' problems and the judge's, for what comes after (regimes, simulation)
     """
@@ -59,6 +95,8 @@ class Location:
     refit_nuisance: Array
     fit: tuple[Design, ...]
     judge: Design
+    forms: Forms
+    start: Start
 
     @property
     def flat(self) -> bool:
@@ -71,7 +109,7 @@ class Location:
         return self.level["refit"] / max(self.level["chosen"], 1.0)
 
 
-def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Location:
+def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Start | None = None) -> Location:
     """Find the places of the gap between a rig model and its logs.
 
     Parameters
@@ -79,13 +117,15 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Locatio
     model : the nominal rig with its tolerances
     fit : logs the corrections are fitted to
     holdout : log they are judged on
+    start : parameters and effects already in the model; the places then tell what those leave
     """
-    designs = _designs(model, [*fit, holdout])
+    start = start or Start()
+    designs = _designs(model, [*fit, holdout], start)
     fitted, judge = designs[:-1], designs[-1]
-    count = len(model.parameters)
+    offset, count = start.offset(model), len(model.parameters)
     places = [basis.place for basis in judge.bases]
-    choice = _halved(fitted, count, places)
-    final = forms_of(_stacked(fitted), _stacked([judge]), count, places)
+    choice = _halved(fitted, offset, places)
+    final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
     names = list(final.groups)
     chosen = _smallest(choice, names)
     sets = chosen or best_subset(choice, 3, [], names)
@@ -105,10 +145,12 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Locatio
         },
         equations=_by_equation(judge, final, chosen),
         nuisance=final.coefficients(chosen)[:count],
-        coefficients=_spread(final, chosen),
+        coefficients=spread(final, chosen),
         refit_nuisance=final.coefficients(())[:count],
         fit=tuple(fitted),
         judge=judge,
+        forms=final,
+        start=start,
     )
 
 
@@ -119,15 +161,18 @@ def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> 
     )
 
 
-def _designs(model: RigModel, logs: Sequence[Signals]) -> list[Design]:
-    first = design_of(model, logs[0])
-    designs = [first, *(design_of(model, log, first.features.yardstick) for log in logs[1:])]
-    count, places = len(model.parameters), [basis.place for basis in first.bases]
+def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
+    explained = [None if start.nominal else start.predict(model, log) for log in logs]
+    first = design_of(model, logs[0], explained=explained[0])
+    yardstick = first.features.yardstick
+    rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
+    designs = [first, *rest]
+    offset, places = start.offset(model), [basis.place for basis in first.bases]
     # Twice: the first pass moves to within a few per cent of the sensor's error, the second removes what bends.
     for _ in range(2):
-        forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), count, places)
+        forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)
         for place in [name for name in forms.groups if name.startswith("sensor:")]:
-            error = forms.solve([place])[count:]
+            error = forms.solve([place])[len(offset) :]
             designs = [with_sensor_columns(design, model, place, error) for design in designs]
     return designs
 
@@ -142,11 +187,13 @@ def _stacked(designs: Sequence[Design]) -> tuple[Array, Array]:
     return np.concatenate([residual for residual, _ in parts]), np.concatenate([columns for _, columns in parts])
 
 
-def _halved(designs: Sequence[Design], count: int, places: Sequence[str]) -> Forms:
+def _halved(designs: Sequence[Design], offset: Array, places: Sequence[str]) -> Forms:
     """Fitted on every other block of the logs to fit, judged on the blocks between."""
     residual, columns = _stacked(designs)
     odd = np.concatenate([_odd_rows(design) for design in designs])
-    return forms_of((residual * ~odd, columns * ~odd[:, None]), (residual * odd, columns * odd[:, None]), count, places)
+    return forms_of(
+        (residual * ~odd, columns * ~odd[:, None]), (residual * odd, columns * odd[:, None]), offset, places
+    )
 
 
 def _odd_rows(design: Design) -> NDArray[np.bool_]:
@@ -188,7 +235,7 @@ def _by_equation(judge: Design, forms: Forms, chosen: Sequence[str]) -> dict[str
     states = {
         "nominal": judge.residual,
         "refit": corrected_residual(judge, forms.coefficients(())[:count], none),
-        "chosen": corrected_residual(judge, forms.coefficients(chosen)[:count], _spread(forms, chosen)),
+        "chosen": corrected_residual(judge, forms.coefficients(chosen)[:count], spread(forms, chosen)),
     }
     rows = np.maximum(judge.weight.sum(axis=0), 1.0)
     return {
@@ -197,7 +244,7 @@ def _by_equation(judge: Design, forms: Forms, chosen: Sequence[str]) -> dict[str
     }
 
 
-def _spread(forms: Forms, chosen: Sequence[str]) -> Array:
+def spread(forms: Forms, chosen: Sequence[str]) -> Array:
     """Coefficients of every basis: fitted inside the chosen places, zero outside."""
     out = np.zeros(len(forms.sizes))
     if chosen:

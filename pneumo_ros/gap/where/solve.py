@@ -27,7 +27,8 @@ class Forms:
     """Quadratic forms of a fit and of a judge, over P parameters and the bases, grouped by place.
 
     Built by :func:`forms_of`. ``fit_*`` and ``judge_*`` hold A'A, A'r and r'r of residual r and columns A (whose
-    coefficients reduce it: |r + A x|^2), ``rows`` the number of judged residuals.
+    coefficients reduce it: |r + A x|^2), ``rows`` the number of judged residuals, ``offset`` (P,) how many standard
+    deviations from nominal the parameters already are: the prior holds the sum.
     """
 
     parameters: int
@@ -40,6 +41,7 @@ class Forms:
     judge_cross: Array
     judge_square: float
     rows: float
+    offset: Array
     cache: dict[frozenset[str], tuple[float, Array]] = field(default_factory=dict)
 
     def index(self, places: Iterable[str]) -> NDArray[np.intp]:
@@ -52,7 +54,9 @@ class Forms:
         prior = np.ones(len(index))
         prior[self.parameters :] = (self.sizes[index[self.parameters :] - self.parameters] / LOOSENESS) ** 2
         gram = self.fit_gram[np.ix_(index, index)] + np.diag(prior)
-        return _bounded(gram, -self.fit_cross[index], self.parameters)
+        cross = -self.fit_cross[index]
+        cross[: self.parameters] -= self.offset
+        return _bounded(gram, cross, self.offset)
 
     def value(self, places: Iterable[str]) -> float:
         """Mean square of the judged residuals with these places corrected (null: about one)."""
@@ -75,15 +79,16 @@ class Forms:
         return self.cache[places]
 
 
-def forms_of(fit: tuple[Array, Array], judge: tuple[Array, Array], parameters: int, places: Sequence[str]) -> Forms:
+def forms_of(fit: tuple[Array, Array], judge: tuple[Array, Array], offset: Array, places: Sequence[str]) -> Forms:
     """Quadratic forms from residuals (n,) and columns (n, P + B) of the fitted and the judged rows.
 
     Parameters
     ----------
     fit, judge : residual and columns of each; rows that carry nothing are zero
-    parameters : P
+    offset : (P,) standard deviations that the parameters already are from nominal
     places : (B,) place of each basis column
     """
+    parameters = len(offset)
     groups = {place: parameters + np.flatnonzero(np.asarray(places) == place) for place in dict.fromkeys(places)}
     fit_residual, fit_columns = fit
     residual, columns = judge
@@ -92,7 +97,7 @@ def forms_of(fit: tuple[Array, Array], judge: tuple[Array, Array], parameters: i
         parameters, groups, sizes,
         fit_columns.T @ fit_columns, fit_columns.T @ fit_residual, float(fit_residual @ fit_residual),
         columns.T @ columns, columns.T @ residual, float(residual @ residual),
-        float(max(int(np.count_nonzero(residual)), 1)),
+        float(max(int(np.count_nonzero(residual)), 1)), offset,
     )  # fmt: skip
 
 
@@ -100,26 +105,28 @@ def _square(square: float, cross: Array, gram: Array, x: Array) -> float:
     return float(max(square + 2.0 * np.dot(x, cross) + np.dot(x, gram @ x), 0.0))
 
 
-def _bounded(gram: Array, cross: Array, parameters: int) -> Array:
-    """Minimum of x'Gx/2 - c'x with the first ``parameters`` inside +-REACH: shapes eliminated, then box descent."""
-    p = parameters
+def _bounded(gram: Array, cross: Array, offset: Array) -> Array:
+    """Minimum of x'Gx/2 - c'x with the parameters inside their reach: shapes eliminated, then box descent."""
+    p = len(offset)
+    low, high = -REACH - offset, REACH - offset
     if len(cross) == p:
-        return box_minimum(gram, cross, REACH)
+        return box_minimum(gram, cross, low, high)
     factor = cho_factor(gram[p:, p:], check_finite=False)
     eliminated = cho_solve(factor, np.column_stack([gram[p:, :p], cross[p:]]), check_finite=False)
     reduced = gram[:p, :p] - gram[:p, p:] @ eliminated[:, :p]
-    z = box_minimum(np.ascontiguousarray(reduced), cross[:p] - gram[:p, p:] @ eliminated[:, p], REACH)
+    z = box_minimum(np.ascontiguousarray(reduced), cross[:p] - gram[:p, p:] @ eliminated[:, p], low, high)
     return np.concatenate([z, eliminated[:, p] - eliminated[:, :p] @ z])
 
 
 @njit(cache=True)
-def box_minimum(gram: Array, cross: Array, reach: float) -> Array:
-    """Coordinate descent for x'Gx/2 - c'x, |x| <= reach, to 1e-5."""
-    x, gradient = np.zeros(len(cross)), -cross.copy()
+def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
+    """Coordinate descent for x'Gx/2 - c'x, low <= x <= high, to 1e-5."""
+    x = np.minimum(np.maximum(np.zeros(len(cross)), low), high)
+    gradient = gram @ x - cross
     for _ in range(3000):
         moved = 0.0
         for i in range(len(cross)):
-            new = min(max(x[i] - gradient[i] / gram[i, i], -reach), reach)
+            new = min(max(x[i] - gradient[i] / gram[i, i], low[i]), high[i])
             step = new - x[i]
             if step != 0.0:
                 x[i] = new
