@@ -126,7 +126,7 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     places = [basis.place for basis in judge.bases]
     choice = _halved(fitted, offset, places)
     final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
-    names = list(final.groups)
+    names = final.testable()
     chosen = _smallest(choice, names)
     sets = chosen or best_subset(choice, 3, [], names)
     refit_square = final.value(())
@@ -171,7 +171,7 @@ def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Des
     # Twice: the first pass moves to within a few per cent of the sensor's error, the second removes what bends.
     for _ in range(2):
         forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)
-        for place in [name for name in forms.groups if name.startswith("sensor:")]:
+        for place in [name for name in forms.testable() if name.startswith("sensor:")]:
             error = forms.solve([place])[len(offset) :]
             designs = [with_sensor_columns(design, model, place, error) for design in designs]
     return designs

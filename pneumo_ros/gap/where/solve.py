@@ -48,6 +48,10 @@ class Forms:
         """Columns of the parameters and of these places."""
         return np.concatenate([np.arange(self.parameters), *(self.groups[p] for p in sorted(places))]).astype(int)
 
+    def testable(self) -> list[str]:
+        """Places that move any residual; a channel that the log lacks moves none."""
+        return [place for place, columns in self.groups.items() if self.sizes[columns - self.parameters].max() > 1e-6]
+
     def solve(self, places: Iterable[str]) -> Array:
         """Coefficients of the parameters (in standard deviations) and of these places' shapes, fitted."""
         index = self.index(places)
