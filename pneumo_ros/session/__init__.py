@@ -1,0 +1,1 @@
+"""Session logs and the table of topics. Knows nothing of rclpy."""
