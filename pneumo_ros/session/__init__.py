@@ -1,1 +1,1 @@
-"""Session logs and the table of topics. Knows nothing of rclpy."""
+"""Session logs: reading, checking and repairing them, and playing them back."""
