@@ -78,7 +78,7 @@ def load_session(path: Path | str) -> Recorded:
         if not _has(log, topic):
             return np.empty(0), np.empty((0, len(topic.names)))
         joint: Joint = log.select(topic.name, list(topic.names))
-        return (joint.stamp_ns - start) * 1e-9, joint.position
+        return np.asarray((joint.stamp_ns - start) * 1e-9, dtype=np.float64), joint.position
 
     return Recorded(log.config, *columns(topics.COMMAND), *columns(topics.ESTIMATE), *columns(topics.TRUTH),
                     *columns(topics.ROAD))  # fmt: skip
