@@ -34,7 +34,7 @@ from pneumo_ros.session.container import (
     parse,
     take_record,
 )
-from pneumo_ros.session.reading import Log, assemble
+from pneumo_ros.session.reading import Log, assemble, read_log
 from pneumo_ros.session.records import Gathered, gather
 
 # A record starts with its opcode and a length; none here is 4 GiB long, so the upper half of the length is zero.
@@ -317,3 +317,19 @@ def _chained(buffer: mmap.mmap | bytes, position: int) -> bool:
             return True
         position = frame.end
     return True
+
+
+def read_or_salvage(path: Path) -> tuple[Log, str]:
+    """The log, or what is left of it and a line that says so; '' if it is whole.
+
+    Raises
+    ------
+    InputError
+        if nothing can be read.
+    """
+    try:
+        return read_log(path), ""
+    except DamageError as error:
+        found = salvage(path)
+        of = f" of {found.expected}" if found.expected is not None else ""
+        return found.log, f"{error.what}, {path}: going on with the {found.kept}{of} messages that are whole"
