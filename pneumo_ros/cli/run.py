@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from pneumo_ros.cli.tables import summary_table, timing_table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -147,7 +148,23 @@ def _run_session(console: Console, values: Values, single_process: bool, domain_
 
 
 def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
-    pass
+    """Table of the active run beside passive valves on the same road, and the picture."""
+    from pneumo_ros.session.passive import passive_twin
+    from pneumo_ros.session.summary import load_session, loop_timing, summarise
+
+    session = load_session(target)
+    other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
+    ours = summarise(session, loop_timing(target))
+    theirs = summarise(other) if other is not None else None
+    console.print(summary_table(ours, theirs))
+    console.print(timing_table(ours))
+    console.print(f"log      {target}")
+    if picture:
+        from pneumo_ros.session.picture import draw_session
+
+        png = target.with_suffix(".png")
+        draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
+        console.print(f"picture  {png}")
 
 
 if __name__ == "__main__":
