@@ -36,11 +36,14 @@ def run(*options: str, timeout: float = 120.0) -> tuple[int, str]:
     return process.returncode, said
 
 
-def wait_for(path: Path, size: int, timeout: float = 60.0) -> None:
-    """Until a file has grown to ``size`` bytes."""
+def wait_for(process: subprocess.Popen[str], path: Path, size: int, timeout: float = 60.0) -> None:
+    """Until a session's file has grown to ``size`` bytes; ends the session if it does not."""
     end = time.monotonic() + timeout
     while not path.exists() or path.stat().st_size < size:
-        assert time.monotonic() < end, f"{path} did not grow to {size} bytes"
+        if time.monotonic() > end or process.poll() is not None:
+            process.terminate()
+            said, _ = process.communicate(timeout=30)
+            raise AssertionError(f"{path} did not grow to {size} bytes; the session said:\n{said}")
         time.sleep(0.02)
 
 
