@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.signals.noise import white_noise
+from pneumo_ros.gap.signals.noise import quantum, white_noise
 from pneumo_ros.gap.signals.types import MEASURED, Limitation
 
 Array = NDArray[np.float64]
 
 MIN_RUN = 10  # equal samples in a row that are suspicious at all
+QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion stays within a step
 RUN_FACTOR = 5.0  # times the run length that quantisation explains elsewhere in the channel
 GLITCH_SIGMA = 15.0
 MOSTLY = 0.5  # a channel with fewer real samples than this share is left out
@@ -106,7 +107,8 @@ def _without_stuck(name: str, values: Array, weight: Array, found: list[Limitati
     lengths = np.diff(np.append(starts, len(real)))
     # The median run, weighted by samples, is what quantisation makes of normal motion.
     typical = float(np.median(np.repeat(lengths, lengths)))
-    stuck = np.flatnonzero(lengths >= max(MIN_RUN, RUN_FACTOR * typical))
+    shortest = QUANTISED_RUN if quantum(values[real]) > 0.0 else MIN_RUN
+    stuck = np.flatnonzero(lengths >= max(shortest, RUN_FACTOR * typical))
     if not len(stuck):
         return weight
     kept, levels = weight.copy(), values[real[starts[stuck]]]
