@@ -69,6 +69,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         "mass_scale", 1.0, "1", "believed over true sprung mass and inertia (payload uncertainty, Eq. 6.57)", 0.1, 5.0
     ),
+    Parameter("area_rate_share", 1.0, "1", "share of dA/dt fed forward by the variants that do", 0.0, 1.5),
     Parameter("bushing_feedforward", False, "", "compensate the bushing damping's force rate"),
     Parameter(
         "area_floor_in2",
@@ -188,7 +189,7 @@ def _law(rig: Rig, at_rest: Trim, name: str, v: dict[str, Value], period: float)
         constant_area=float(v["constant_area_in2"]) * SQUARE_INCH,
         area_floor=float(v["area_floor_in2"]) * SQUARE_INCH,
         height_error=float(v["height_error_in"]) * INCH,
-        compensation=Compensation(float(area_rate), damping, float(two_valve)),
+        compensation=Compensation(float(v["area_rate_share"]) * area_rate, damping, float(two_valve)),
         period=period,
     )
 

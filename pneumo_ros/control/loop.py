@@ -72,7 +72,7 @@ def close_loop(
     results = _close(
         start, road, noise, delay, exact, period, substeps(period, car.step),
         car.body, car.front, car.rear, car.surface,
-        *initial, estimator.gains, estimator.model,
+        *initial, estimator.gains, estimator.model, estimator.surface,
         controller.name == "passive", controller.init(), controller.at_rest.command,
         controller.law, controller.front, controller.rear, controller.surface,
     )  # fmt: skip
@@ -131,6 +131,7 @@ def _close(
     gain: NDArray[np.float64],
     gains: NDArray[np.float64],
     model: Model,
+    estimator_surface: AreaSurface,
     passive: bool,
     control: NDArray[np.float64],
     trim_command: NDArray[np.float64],
@@ -148,12 +149,12 @@ def _close(
         before = (areas, gain)
         measurements[i] = measure(states[i], body) + noise[i]
         derivatives, areas, gain, estimates[i] = estimate_half_car(
-            derivatives, areas, gain, measurements[i], gains, model
+            derivatives, areas, gain, measurements[i], gains, model, estimator_surface
         )
         if exact:
             command = applied[i - 1] if i > 0 else trim_command
             exact_kinematics(states[i], command, road[i], body, front, rear, surface, estimates[i])
-            areas, gain = estimate_areas(estimates[i], before[0], before[1], model)
+            areas, gain = estimate_areas(estimates[i], before[0], before[1], model, estimator_surface)
         if passive:
             computed[i] = trim_command
         else:

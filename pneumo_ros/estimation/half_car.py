@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from pneumo_ros.estimation.differentiator import Differentiator, differentiate
 from pneumo_ros.estimation.least_squares import METHODS, initial_gain, update
 from pneumo_ros.parameters import Parameter, Value, settings
-from pneumo_ros.plant.air_spring import MEAN_AREA
+from pneumo_ros.plant.air_spring import MEAN_AREA, AreaSurface, effective_area, load_surface
 from pneumo_ros.rig import Rig
-from pneumo_ros.units import GRAVITY
+from pneumo_ros.units import GRAVITY, INCH, SQUARE_INCH
+
+SMALLEST_SHAPE = 0.2 * SQUARE_INCH  # m2; a regressor near zero could not be told from noise
 
 MEASUREMENT_NAMES = (
     "sprung_front",
@@ -63,6 +65,9 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("gain_bound", 20.0, "s^3/m^2", "k_0: largest norm of the gain matrix P", 1e-3, 1e6),
     Parameter("gain_start", 10.0, "s^3/m^2", "P(0), for the gradient method its constant p", 1e-6, 1e6, read_only=True),
     Parameter("area_start", 1.0, "1", "initial area over the mean area 1.573e-3 m2", 0.1, 5.0, read_only=True),
+    Parameter("known_surface", False, "", "parameters multiply the 2M2A surface at the read heights", read_only=True),
+    Parameter("acceleration_from_pressure", False, "", "accelerations are W a + Psi instead of the differentiator's"),
+    Parameter("height_error_in", 0.0, "in", "error added to the heights the estimator reads (thesis: 0.2)", -1.0, 1.0),
     Parameter(
         "mass_scale", 1.0, "1", "believed over true sprung mass and inertia (payload uncertainty, Eq. 6.57)", 0.1, 5.0
     ),
@@ -83,6 +88,9 @@ class Model(NamedTuple):
     forgetting: float
     gain_bound: float
     period: float
+    known_surface: bool
+    from_pressure: bool
+    height_error: float
 
 
 class EstimatorState(NamedTuple):
@@ -109,6 +117,7 @@ class Estimator:
     gains: NDArray[np.float64]
     gain_start: float
     area_start: float
+    surface: AreaSurface
 
     def init(self, measurement: NDArray[np.float64]) -> EstimatorState:
         """State at rest at a first measurement (6,)."""
@@ -122,7 +131,9 @@ class Estimator:
         self, state: EstimatorState, measurement: NDArray[np.float64]
     ) -> tuple[EstimatorState, NDArray[np.float64]]:
         """Take in a measurement (6,), m and Pa; return new state and estimate (16,), :data:`ESTIMATE_NAMES`."""
-        derivatives, areas, gain, estimate = estimate_half_car(*state, measurement, self.gains, self.model)
+        derivatives, areas, gain, estimate = estimate_half_car(
+            *state, measurement, self.gains, self.model, self.surface
+        )
         return EstimatorState(derivatives, areas, gain), estimate
 
 
@@ -146,8 +157,18 @@ def build_estimator(
         float(v["forgetting"]),
         float(v["gain_bound"]),
         period,
+        bool(v["known_surface"]),
+        bool(v["acceleration_from_pressure"]),
+        float(v["height_error_in"]) * INCH,
     )
-    return Estimator(model, differentiator, differentiator.coefficients, float(v["gain_start"]), float(v["area_start"]))
+    return Estimator(
+        model,
+        differentiator,
+        differentiator.coefficients,
+        float(v["gain_start"]),
+        float(v["area_start"]),
+        load_surface(),
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,6 +188,7 @@ def estimate_half_car(
     measurement: NDArray[np.float64],
     gains: NDArray[np.float64],
     model: Model,
+    surface: AreaSurface,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """One step: new derivatives (4, n + 1), areas (2,), gain (2, 2) and the estimate (16,)."""
     new = differentiate(derivatives, measurement[:4], gains, model.filtering, model.period)
@@ -176,26 +198,41 @@ def estimate_half_car(
         out[2 * order], out[2 * order + 1] = heave, pitch
         out[6 + 2 * order], out[7 + 2 * order] = front, rear
     out[12], out[13] = measurement[4], measurement[5]
-    new_areas, new_gain = estimate_areas(out, areas, gain, model)
+    new_areas, new_gain = estimate_areas(out, areas, gain, model, surface)
     return new, new_areas, new_gain, out
 
 
 @njit(cache=True, error_model="numpy")
 def estimate_areas(
-    x: NDArray[np.float64], areas: NDArray[np.float64], gain: NDArray[np.float64], model: Model
+    x: NDArray[np.float64], areas: NDArray[np.float64], gain: NDArray[np.float64], model: Model, surface: AreaSurface
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Least squares step on an estimate (16,) whose kinematics and pressures are in; writes its areas, m2."""
-    W, residual = regression(x, areas, model)
+    shapes = area_shapes(x, model, surface)
+    W, residual = regression(x, areas, shapes, model)
     new_areas, new_gain = update(
         model.method, areas, gain, W, residual, model.forgetting, model.gain_bound, model.period
     )
-    x[14], x[15] = MEAN_AREA * new_areas[0], MEAN_AREA * new_areas[1]
+    x[14], x[15] = shapes[0] * new_areas[0], shapes[1] * new_areas[1]
+    if model.from_pressure:
+        _, residual = regression(x, new_areas, shapes, model)
+        x[4] -= residual[0]
+        x[5] -= residual[1] / np.sqrt(model.inertia / model.mass)
     return new_areas, new_gain
 
 
 @njit(cache=True, error_model="numpy")
+def area_shapes(x: NDArray[np.float64], model: Model, surface: AreaSurface) -> tuple[float, float]:
+    """What the estimated parameters multiply, m2: the mean area, or the area surface at the read heights."""
+    if not model.known_surface:
+        return MEAN_AREA, MEAN_AREA
+    front = effective_area(x[6] + model.height_error, x[12] - model.ambient, surface)
+    rear = effective_area(x[7] + model.height_error, x[13] - model.ambient, surface)
+    return max(front, SMALLEST_SHAPE), max(rear, SMALLEST_SHAPE)
+
+
+@njit(cache=True, error_model="numpy")
 def regression(
-    x: NDArray[np.float64], areas: NDArray[np.float64], model: Model
+    x: NDArray[np.float64], areas: NDArray[np.float64], shapes: tuple[float, float], model: Model
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """W (2, 2) and Y - Psi - W a (2,) of Eq. 6.91, both rows in m/s2.
 
@@ -203,7 +240,7 @@ def regression(
     squares would weigh the pitch equation by the square of an arbitrary length.
     """
     radius = np.sqrt(model.inertia / model.mass)
-    pf, pr = (x[12] - model.ambient) * MEAN_AREA / model.mass, (x[13] - model.ambient) * MEAN_AREA / model.mass
+    pf, pr = (x[12] - model.ambient) * shapes[0] / model.mass, (x[13] - model.ambient) * shapes[1] / model.mass
     df, dr = model.damping * x[8] / model.mass, model.damping * x[9] / model.mass
     a, b = model.front_arm / radius, model.rear_arm / radius
     W = np.array([[pf, pr], [a * pf, -b * pr]])
