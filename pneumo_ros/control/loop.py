@@ -6,6 +6,7 @@ command holds from this sample (or ``delay`` periods later) to the next.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,7 @@ def close_loop(
     seed: int = 0,
     delay: int = 0,
     exact: bool = False,
+    offsets: Sequence[float] = (0.0,) * 6,
 ) -> Run:
     """Run a closed loop from rest at the controller's trim.
 
@@ -61,12 +63,14 @@ def close_loop(
     seed : of the sensor noise
     delay : whole periods between sample and valve
     exact : True gives estimator and controller the true rates and accelerations, as the thesis's simulations do
+    offsets : of the six sensors, m and Pa
     """
     road = np.ascontiguousarray(road, dtype=float)
     count, period = len(road) - 1, controller.law.period
     noise = np.random.default_rng(seed).standard_normal((count, 6))
     noise *= [rig.displacement_noise.value] * 4 + [rig.pressure_noise.value] * 2
     start = controller.at_rest.state
+    noise += np.asarray(offsets, dtype=float)
     first = measure(start, car.body) + noise[0]
     initial = estimator.init(first)
     results = _close(
