@@ -67,12 +67,14 @@ class RigModel:
     Attributes
     ----------
     rig : nominal values and tolerances
-    library : effects by id
+    library : effects by id, all of them in the compiled kernel
+    withheld : ids that the competition does without (the kernel keeps them, so nothing is compiled anew)
     step : longest RK4 step, s
     """
 
     rig: Rig
     library: Mapping[str, Effect] = field(default_factory=load_library)
+    withheld: frozenset[str] = frozenset()
     step: float = FIT_STEP
     surface: AreaSurface = field(default_factory=load_surface)
 
@@ -90,8 +92,8 @@ class RigModel:
 
     @property
     def effects(self) -> Mapping[str, Effect]:
-        """The library."""
-        return self.library
+        """The effects that compete."""
+        return {name: effect for name, effect in self.library.items() if name not in self.withheld}
 
     def places(self, active: Active) -> tuple[str, ...]:
         """Places touched, first the one blamed."""
@@ -167,6 +169,11 @@ class RigModel:
         held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
         on, values = self._switches(terms)
         return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+
+    def changes(self, record: Signals) -> dict[str, float]:
+        """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
+        pairs = {name: (getattr(record.rig, q).value, getattr(self.rig, q).value) for name, q in NUISANCE.items()}
+        return {name: new / old for name, (new, old) in pairs.items() if old > 0.0 and new != old}
 
     def events(self, record: Signals) -> list[tuple[int, int]]:
         """Jumps of the inlet commands (row, column); none where the command moves all the time."""
