@@ -11,6 +11,7 @@ from pneumo_ros.gap.fit import bounded_newton
 from pneumo_ros.gap.model import Active, Array, Model
 from pneumo_ros.gap.problem import INITIAL_WIDENING, scale_of
 
+BOOTSTRAP_BLOCK = 1.0  # s: longer than the slowest oscillation of a residual
 SETTLE = 0.2  # s at the start of a held-out log from which its initial state is estimated
 
 
@@ -62,3 +63,25 @@ def channel_gaps(record: Any, predicted: Array) -> Array:
 def total_gap(per_channel: Array) -> float:
     """Contract section 3: root mean square over the channels."""
     return float(np.sqrt(np.mean(np.square(per_channel))))
+
+
+def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, seed: int = 1) -> tuple[float, float]:
+    """90 % interval of 1 - gap(best)/gap(refit) by moving blocks of time (Kuensch 1989): both errors drawn together."""
+    there = record.weight > 0.0
+    scale = scale_of(record) * np.sqrt(np.maximum(there.sum(axis=0), 1))
+    squares = [np.sum(np.where(there, (record.measured - y) / scale, 0.0) ** 2, axis=1) for y in (refit, best)]
+    if not all(np.all(np.isfinite(s)) for s in squares):
+        return (-np.inf, 0.0)
+    length = max(1, round(BOOTSTRAP_BLOCK / record.period))
+    sums = [np.convolve(s, np.ones(length), mode="valid") for s in squares]
+    rng = np.random.default_rng(seed)
+    count = max(1, len(squares[0]) // length)
+    starts = rng.integers(0, len(sums[0]), size=(draws, count))
+    ratio = np.sqrt(sums[1][starts].sum(axis=1) / np.maximum(sums[0][starts].sum(axis=1), 1e-300))
+    low, high = np.quantile(1.0 - ratio, [0.05, 0.95])
+    return float(low), float(high)
+
+
+def noise_floor(record: Any) -> Array:
+    """(C,) gap that the sensors' white noise alone leaves."""
+    return np.asarray(record.noise / scale_of(record))

@@ -34,7 +34,9 @@ JUMP = 12.0  # medians of the command's change from row to row
 SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
 _NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
-# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each.
+# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. The volume's
+# level and its slope over height are known equally well, and not by the same measurement: both are free (a common factor
+# would leave V/(dV/dh), hence the air's stiffness, exact).
 NUISANCE = {
     "sprung_mass": "sprung_mass",
     "pitch_inertia": "pitch_inertia",
@@ -51,6 +53,8 @@ NUISANCE = {
     "effective_area_scale_rear": "effective_area_scale",
     "volume_scale_front": "volume_scale",
     "volume_scale_rear": "volume_scale",
+    "volume_slope_scale_front": "volume_scale",
+    "volume_slope_scale_rear": "volume_scale",
     "discharge_coefficient_front": "discharge_coefficient",
     "discharge_coefficient_rear": "discharge_coefficient",
 }
@@ -63,12 +67,14 @@ class RigModel:
     Attributes
     ----------
     rig : nominal values and tolerances
-    library : effects by id
+    library : effects by id, all of them in the compiled kernel
+    withheld : ids that the competition does without (the kernel keeps them, so nothing is compiled anew)
     step : longest RK4 step, s
     """
 
     rig: Rig
     library: Mapping[str, Effect] = field(default_factory=load_library)
+    withheld: frozenset[str] = frozenset()
     step: float = FIT_STEP
     surface: AreaSurface = field(default_factory=load_surface)
 
@@ -86,8 +92,8 @@ class RigModel:
 
     @property
     def effects(self) -> Mapping[str, Effect]:
-        """The library."""
-        return self.library
+        """The effects that compete."""
+        return {name: effect for name, effect in self.library.items() if name not in self.withheld}
 
     def places(self, active: Active) -> tuple[str, ...]:
         """Places touched, first the one blamed."""
@@ -163,6 +169,11 @@ class RigModel:
         held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
         on, values = self._switches(terms)
         return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+
+    def changes(self, record: Signals) -> dict[str, float]:
+        """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
+        pairs = {name: (getattr(record.rig, q).value, getattr(self.rig, q).value) for name, q in NUISANCE.items()}
+        return {name: new / old for name, (new, old) in pairs.items() if old > 0.0 and new != old}
 
     def events(self, record: Signals) -> list[tuple[int, int]]:
         """Jumps of the inlet commands (row, column); none where the command moves all the time."""
@@ -247,6 +258,8 @@ def _plant(rig: Rig, step: float, names: tuple[str, ...], values: tuple[float, .
 
 def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
     volume = v.get(f"volume_scale_{end}", rig.volume_scale.value)
+    slope = v.get(f"volume_slope_scale_{end}", rig.volume_scale.value)
+    level = VOLUME_OFFSET + MEAN_AREA * rig.design_height.value
     coefficient = v.get(f"discharge_coefficient_{end}", rig.discharge_coefficient.value)
     supply = v.get("supply_pressure", gas.supply_pressure)
     # The log carries the commanded outlet; the estimate is of the opening that the nominal command really gives.
@@ -257,8 +270,8 @@ def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
         supply_power=(gas.reference_pressure / supply) ** gas.k,
         inlet_scale=coefficient,
         outlet_scale=coefficient * opening,
-        volume_offset=VOLUME_OFFSET * volume,
-        mean_area=MEAN_AREA * volume,
+        volume_offset=level * volume - MEAN_AREA * slope * rig.design_height.value,
+        mean_area=MEAN_AREA * slope,
     )
 
 
