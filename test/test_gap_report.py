@@ -82,7 +82,7 @@ def test_the_page_is_whole_and_refers_to_nothing_outside() -> None:
 
 def test_the_page_says_verdict_place_size_and_shrink() -> None:
     page = render(findings())
-    assert "The spring leaks at the front." in page and "sure: 97 %" in page
+    assert "At the front, the spring leaks." in page and "sure: 97 %" in page
     assert "by 98 % (90 % interval 96 % to 99 %)" in page
     assert "the front air and valve" in page and "93 %" in page
     assert "0.4100 ± 0.0020" in page and "mm²" in page
@@ -111,7 +111,7 @@ def test_a_pair_is_named_with_both_effects() -> None:
     summary |= {"verdict": "leak+valve_lag"}
     summary["ranking"] = [{**summary["ranking"][0], "effects": ["leak", "valve_lag"], "sites": ["front", "both"]}]
     words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve"})
-    assert words == "A leak at the front and a slow valve at both ends."
+    assert words == "At the front, a leak; and at both ends, a slow valve."
 
 
 @pytest.mark.parametrize("place", PLACES)
