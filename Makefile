@@ -37,7 +37,7 @@ bench: $(READY)  ## Every benchmark, side by side with its limit
 	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 docs: $(READY)  ## Write the generated tables of docs/ anew
-	$(BIN)/python -m pneumo_ros.cli.tables
+	$(BIN)/python -m pneumo_ros.cli.reference
 
 lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
 	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra dev \
