@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from pneumo_ros.session.repair import Recovery
     from pneumo_ros.session.salvage import Salvaged
 
-app = typer.Typer(help="Look into a session log, check, repair, export and compare.", no_args_is_help=True)
+app = typer.Typer(
+    add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
+)
 console = Console()
 
 LogPath = Annotated[Path, typer.Argument(help="Session log (.mcap) or a folder as `ros2 bag record` writes it.")]

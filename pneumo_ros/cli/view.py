@@ -17,8 +17,9 @@ from rich.console import Console
 
 from pneumo_ros.errors import InputError
 
-app = typer.Typer(help="Show a session in the browser: a log played back, or a running session.")
+app = typer.Typer(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
 console = Console()
+END_PATIENCE = 5.0  # s a dashboard has to close its connections
 
 Host = Annotated[str, typer.Option(help="Address to serve on; anything but this computer needs the token it prints.")]
 Port = Annotated[int, typer.Option(help="Port; 0 takes a free one.", min=0, max=65535)]
@@ -87,7 +88,11 @@ def beside(domain_id: int | None) -> Iterator[Viewer]:
         yield Viewer(process)
     finally:
         process.send_signal(signal.SIGINT)
-        process.wait()
+        try:
+            process.wait(END_PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 @dataclass(frozen=True)

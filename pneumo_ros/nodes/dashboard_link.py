@@ -155,9 +155,11 @@ class LiveLink:
         return take
 
     def _note_time(self, stamp: int) -> None:
-        if not self._start_ns or stamp < self._start_ns or self._ended:
-            self._start_ns, self._ended = stamp, ""
-        self._latest_ns, self._heard = stamp, time.monotonic()
+        # Stragglers may follow the event that ends a session; the stamps of the next one are far from them.
+        if not self._start_ns or abs(stamp - self._latest_ns) > QUIET * 1e9:
+            self._start_ns = self._latest_ns = stamp
+            self._ended = ""
+        self._latest_ns, self._heard = max(stamp, self._latest_ns), time.monotonic()
 
     def _on_events(self, message: DiagnosticArray) -> None:
         now = self._latest_ns or message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
