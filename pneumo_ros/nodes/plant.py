@@ -27,6 +27,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("duration", 20.0, "s", "length of the session; 0 runs until stopped", 0.0, 86400.0, read_only=True),
     Parameter("seed", 1, "1", "seed of the sensor noise", 0, 2**31 - 1, read_only=True),
     Parameter("truth_every", 5, "1", "publish /sim/truth every so many periods", 1, 1000, read_only=True),
+    Parameter("clock_every", 5, "1", "publish /clock every so many periods (lockstep)", 1, 10, read_only=True),
     Parameter("report_progress", False, "", "print the simulated time on standard output", read_only=True),
 )
 
@@ -157,7 +158,7 @@ class PlantNode(RigNode):
         noise = self.noise.next()
         exact = read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm)
         values = [e + n for e, n in zip(exact, noise, strict=True)]
-        if self._send_clock is not None:
+        if self._send_clock is not None and self.index % self.values["clock_every"] == 0:
             self._send_clock(encode_clock(stamp))
         self._send_measurement[0](self._displacement.encode(stamp, values[:4]))
         self._send_measurement[1](self._pressures[0].encode(stamp, values[4]))

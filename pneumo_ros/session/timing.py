@@ -20,7 +20,8 @@ class TimingRecord:
         """Record one duration."""
         self._values.append(seconds)
         self.count += 1
-        self.maximum = max(self.maximum, seconds)
+        if seconds > self.maximum:
+            self.maximum = seconds
 
     def percentiles(self, wanted: Iterable[float] = (50.0, 99.0)) -> tuple[float, ...]:
         """Percentiles over the window, s; zeros before the first value."""
