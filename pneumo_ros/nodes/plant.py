@@ -11,6 +11,7 @@ from rclpy.context import Context
 from std_msgs.msg import String
 
 from pneumo_ros.nodes.base import OK, RigNode
+from pneumo_ros.nodes.emergency_stop import EmergencyStop
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.plant.sensors import NoiseSource, read_channels, truth
@@ -50,6 +51,7 @@ class PlantNode(RigNode):
         self._deadlines: Deadlines | None = None
         self._next_progress = 0.0
         self._make_topics()
+        self.estop = EmergencyStop(self)
         # Load the compiled code now: the first period of a real-time session is as short as the others.
         self.car.advance(self.state, self.command, self.road, 1e-3)
         truth(self.car, self.state, self.command, self.road[1])
@@ -112,7 +114,7 @@ class PlantNode(RigNode):
         if areas is None or heights is None or self.index < 0 or self.stop.set:
             return
         start = time.monotonic_ns()
-        self.command[:] = areas
+        self.command[:] = self.estop.applied(areas)
         self.road[0] = self._roads.pop(self.stamp(self.index), heights)
         self.road[1] = heights
         self._step()
@@ -126,7 +128,7 @@ class PlantNode(RigNode):
         if deadlines is None or not deadlines.due(start) or self.stop.set:
             return
         for areas in self._commands.values():
-            self.command[:] = areas
+            self.command[:] = self.estop.applied(areas)
         # Skipped periods are simulated, so that the rig keeps pace with the clock; nobody measures in them.
         for _ in range(deadlines.advance(start)):
             self._pass_road()
