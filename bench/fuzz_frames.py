@@ -33,7 +33,7 @@ def seeds() -> list[bytes]:
 
 
 def mutated(rng: random.Random, corpus: list[bytes]) -> bytes:
-    """One frame after up to four edits: bits, bytes, insertions, deletions, swaps, splices, a right CRC on any content."""
+    """One frame after up to four edits: bits, bytes, insertions, deletions, swaps, splices, right CRC, any content."""
     data = bytearray(rng.choice(corpus))
     for _ in range(rng.randint(1, 4)):
         place = rng.randrange(len(data)) if data else 0

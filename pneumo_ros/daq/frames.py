@@ -280,15 +280,17 @@ def _hello_request(body: bytes) -> HelloRequest:
 
 
 def _hello(body: bytes) -> Hello:
-    fields = _HELLO_FIXED.unpack_from(body)
+    nonce, boot_id, device_us, period_us, watchdog_us, *small, name = _HELLO_FIXED.unpack_from(body)
+    major, minor, patch, adc_bits, dac_bits = small
     split = _HELLO_FIXED.size + INPUT_COUNT * _INPUT.size
     inputs = tuple(InputRange(*entry) for entry in _INPUT.iter_unpack(body[_HELLO_FIXED.size : split]))
     outputs = tuple(OutputRange(*entry) for entry in _OUTPUT.iter_unpack(body[split:]))
-    adc_bits, dac_bits = fields[8], fields[9]
     if not (8 <= adc_bits <= 32 and 8 <= dac_bits <= 16):
         raise ValueError("converter width")
-    firmware = (fields[5], fields[6], fields[7])
-    return Hello(*fields[:5], firmware, adc_bits, dac_bits, _ascii(fields[10]), inputs, outputs)
+    firmware = (major, minor, patch)
+    return Hello(
+        nonce, boot_id, device_us, period_us, watchdog_us, firmware, adc_bits, dac_bits, _ascii(name), inputs, outputs
+    )
 
 
 def _ascii(name: bytes) -> str:
@@ -311,10 +313,11 @@ def _command(body: bytes) -> Command:
 
 
 def _status(body: bytes) -> Status:
-    device_us, state, fault, flags, *rest, reserved = _STATUS.unpack(body)
+    device_us, state, fault, flags, sequence, command_us, good, bad, refused, *counts, reserved = _STATUS.unpack(body)
     if reserved != 0:
         raise ValueError("reserved byte")
-    return Status(device_us, DeviceState(state), DeviceFault(fault), _flags(flags), *rest[:5], tuple(rest[5:]))
+    known = DeviceState(state), DeviceFault(fault), _flags(flags)
+    return Status(device_us, *known, sequence, command_us, good, bad, refused, tuple(counts))
 
 
 def _flags(value: int) -> SampleFlag:
