@@ -105,7 +105,7 @@ def points_file(tmp_path: Path, rows: list[tuple[str, float, str, float]]) -> Pa
 def rows_of(gain: float, offset: float, references: np.ndarray, repeats: int, noise: float, seed: int):
     rng = np.random.default_rng(seed)
     return [
-        ("sprung_front", float(r), "in", (r - offset) / gain + noise * rng.standard_normal())
+        ("sprung_front", float(r), "in", float((r - offset) / gain + noise * rng.standard_normal()))
         for r in references for _ in range(repeats)
     ]  # fmt: skip
 

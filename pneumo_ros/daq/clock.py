@@ -1,7 +1,7 @@
 """Device clock to host clock: offset and drift from arrivals alone, refined by the round trip of commands.
 
-An arrival is the sample time plus a delay that is never negative, so the points (device time, arrival - device time)
-lie above a line whose slope is the drift and whose height is the offset plus the smallest delay. The line is the edge of
+An arrival is the sample time plus a delay that is never negative: the points (device time, arrival - device time) lie
+above a line whose slope is the drift and whose height is the offset plus the smallest delay. The line is the edge of
 their lower convex hull below the mean device time: of all lines under the points it is the one with the smallest sum of
 distances, and late arrivals do not move it (Moon, Skelly and Towsley, "Estimation and removal of clock skew from
 network delay measurements", IEEE INFOCOM 1999). What one direction cannot see, its smallest delay, is halved with the
