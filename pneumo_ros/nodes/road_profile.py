@@ -67,3 +67,7 @@ class RoadProfileNode(RigNode):
 def main(args: list[str] | None = None) -> int:
     """Entry point of ``road_profile``."""
     return node_main(RoadProfileNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
