@@ -35,9 +35,7 @@ def run(
     rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
-    output: Annotated[
-        Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")
-    ] = None,
+    output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
     domain_id: Annotated[
         int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
     ] = None,
