@@ -69,7 +69,7 @@ class PlausibilityMonitor:
         """Forget the past: after a gap in the samples."""
         self._last = [math.nan] * len(SENSORS)
         self._age = [0.0] * len(SENSORS)
-        self._counts = [None] * len(SENSORS)
+        self._counts: list[int | None] = [None] * len(SENSORS)
         self._runs = [0] * len(SENSORS)
         self._bad = [0] * len(SENSORS)
         self._looks = 0
@@ -117,9 +117,9 @@ class PlausibilityMonitor:
 class ForceBalance:
     """Displacement against pressure: over a second, each spring's mean force is the load it carries.
 
-    The force follows from pressure and height through the effective area; the load from mass and arms. Over a window w the
-    mean acceleration is at most the change of velocity over w, a few percent of g on this rig's roads. Not judged
-    while a spring sits on its bump stop, which then carries part of the load.
+    The force follows from pressure and height through the effective area, the load from mass and arms. Over a window w
+    the mean acceleration is the change of velocity over w, a few percent of g on this rig's roads. Not judged while a
+    spring sits on its bump stop, which then carries part of the load.
     """
 
     def __init__(self, rig: Rig, tolerance: float, window: float, surface: AreaSurface | None = None) -> None:
