@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
+from pneumo_ros.cli.tables import summary_table, timing_table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -53,7 +55,7 @@ def run(
     _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": "sim"})
     _check(values, target)
     console = Console()
-    _run_session(console, values, single_process, domain_id)
+    _run_session(console, values, target, single_process, domain_id)
     _report(console, target, values, picture)
 
 
@@ -121,7 +123,7 @@ def _check(values: Values, target: Path) -> None:
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
 
 
-def _run_session(console: Console, values: Values, single_process: bool, domain_id: int | None) -> None:
+def _run_session(console: Console, values: Values, target: Path, single_process: bool, domain_id: int | None) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
@@ -129,10 +131,17 @@ def _run_session(console: Console, values: Values, single_process: bool, domain_
     names = ("single_process",) if single_process else SIM_NODES
     nodes = [NodeProcess(name, f"pneumo_ros.nodes.{name}") for name in names]
     lead = "single_process" if single_process else "plant"
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
-               TimeElapsedColumn(), TimeRemainingColumn())  # fmt: skip
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f} s of {task.fields[length]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    length = float(values["plant"]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("session", total=float(values["plant"]["duration"]) or None)
+        task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # both end the session in order
         supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
         try:
             with supervisor:
@@ -140,14 +149,50 @@ def _run_session(console: Console, values: Values, single_process: bool, domain_
         except SessionError as error:
             progress.stop()
             Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
+            _save_what_is_left(target)
             raise typer.Exit(FAILED) from error
         except KeyboardInterrupt:
             progress.stop()
             console.print("stopped by the user; the log is finished")
 
 
+def _save_what_is_left(target: Path) -> None:
+    """Say where the log is; if its recorder died, make a readable one of what it had written."""
+    from pneumo_ros.session.repair import recover
+
+    out = Console(stderr=True, highlight=False, soft_wrap=True)
+    part = target.with_name(target.name + ".part")
+    if target.exists():
+        out.print(f"log until then: {target}")
+        return
+    if not part.exists():
+        return
+    try:
+        found = recover(part, target.with_suffix(".recovered.mcap"))
+    except InputError as error:
+        out.print(f"the recorder left nothing that can be read: {error}")
+        return
+    out.print(f"recovered {found.kept} messages: {found.output}")
+
+
 def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
-    pass
+    """Table of the active run beside passive valves on the same road, and the picture."""
+    from pneumo_ros.session.passive import passive_twin
+    from pneumo_ros.session.summary import load_session, loop_timing, summarise
+
+    session = load_session(target)
+    other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
+    ours = summarise(session, loop_timing(target))
+    theirs = summarise(other) if other is not None else None
+    console.print(summary_table(ours, theirs))
+    console.print(timing_table(ours))
+    console.print(f"log      {target}")
+    if picture:
+        from pneumo_ros.session.picture import draw_session
+
+        png = target.with_suffix(".png")
+        draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
+        console.print(f"picture  {png}")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -28,6 +29,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
+from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import TimingRecord
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 
@@ -56,10 +58,14 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 
 class StopRequest:
-    """Asks the spinning loop to end; shared by its nodes."""
+    """Asks the spinning loop to end; shared by its nodes.
+
+    ``failed`` says that the session ended because something broke, not because it was over.
+    """
 
     def __init__(self) -> None:
         self.set = False
+        self.failed = False
 
 
 class RigNode(Node):
@@ -207,8 +213,15 @@ class RigNode(Node):
         return OK, "running" if self.ready else "waiting for the session"
 
     def _publish_diagnostics(self) -> None:
+        self._end_if_alone()
         level, message = self.health_level()
         self._diagnostics.publish(self._array(level, f"{self.get_name()}: loop", message, self.health()))
+
+    def _end_if_alone(self) -> None:
+        """A node must not drive valves for a session whose supervisor was killed."""
+        supervisor = os.environ.get(SUPERVISOR)
+        if supervisor and os.getppid() != int(supervisor):
+            self.stop.failed = self.stop.set = True
 
     def event(self, level: bytes, code: str, message: str, values: Mapping[str, str] | None = None) -> None:
         """Publish an event; ``code`` is its reason code."""

@@ -32,6 +32,8 @@ class ControllerNode(RigNode):
         super().__init__("controller", PARAMETERS, context=context, overrides=overrides)
         self.rig = load_rig(self.values["rig"] or None)
         self.controller = self._build()
+        # Load the compiled code now: the first period of a real-time session is as short as the others.
+        self.controller.step(self.controller.init(), np.full(16, 1e-3))
         self.state: NDArray[np.float64] | None = None
         self._safe = self.controller.at_rest.command
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode

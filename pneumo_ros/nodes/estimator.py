@@ -24,6 +24,8 @@ class EstimatorNode(RigNode):
         super().__init__("estimator", PARAMETERS, context=context, overrides=overrides)
         self.rig = load_rig(self.values["rig"] or None)
         self.estimator = self._build()
+        # Load the compiled code now: the first period of a real-time session is as short as the others.
+        self.estimator.step(self.estimator.init(np.zeros(6)), np.full(6, 2e5))
         self.state: EstimatorState | None = None
         self._sample = np.zeros(6)
         self._stamps = [0, 0, 0]

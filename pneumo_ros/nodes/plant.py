@@ -48,6 +48,9 @@ class PlantNode(RigNode):
         self._deadlines: Deadlines | None = None
         self._next_progress = 0.0
         self._make_topics()
+        # Load the compiled code now: the first period of a real-time session is as short as the others.
+        self.car.advance(self.state, self.command, self.road, 1e-3)
+        truth(self.car, self.state, self.command, self.road[1])
 
     def _make_topics(self) -> None:
         variance = self.rig.pressure_noise.value**2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
@@ -20,6 +21,7 @@ from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.cdr import stamp_of
 from pneumo_ros.session.provenance import versions
+from pneumo_ros.session.supervisor import END_REASON
 from pneumo_ros.session.topics import STRING, TOPICS, Topic
 from pneumo_ros.session.writing import Channel, LogWriter, Written
 
@@ -95,7 +97,14 @@ class SessionRecorderNode(RigNode):
     def on_stop(self, executor: Executor) -> None:
         """Take what is still in the queues, then finish the file."""
         self.drain(executor)
-        self.written = self.writer.finish()
+        self.written = self.writer.finish(not self.stop.failed, self._reason())
+
+    def _reason(self) -> str:
+        """Why the session failed, as its supervisor left it."""
+        note = os.environ.get(END_REASON)
+        if not self.stop.failed:
+            return ""
+        return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else "stopped by SIGTERM"
 
     def drain(self, executor: Executor) -> None:
         """Spin until nothing has come for :data:`QUIET_PERIOD`."""

@@ -24,7 +24,7 @@ BAD_INPUT = 2
 
 
 class SignalStop(StopRequest):
-    """Set by SIGINT and SIGTERM."""
+    """Set by SIGINT (the session is over) and SIGTERM (something broke)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -33,6 +33,7 @@ class SignalStop(StopRequest):
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self.set = True
+        self.failed |= number == signal.SIGTERM
 
 
 def make_executor(kind: str, context: Context | None) -> Executor:

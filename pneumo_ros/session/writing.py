@@ -66,7 +66,8 @@ class LogWriter:
     Parameters
     ----------
     path : final name of the file (.mcap)
-    metadata : name -> (key -> text) records that explain the run (config, seeds, versions ...)
+    metadata : name -> (key -> text) records that explain the run (config, seeds, versions ...); written first, so that
+        a log whose recorder was killed still explains itself
 
     :meth:`write` only queues; a thread does the rest. :meth:`finish` must be called, also after an error.
 
@@ -80,11 +81,15 @@ class LogWriter:
         self.path = path
         self.part = path.with_name(path.name + ".part")
         _refuse_bad_target(path)
-        self._metadata = {name: dict(values) for name, values in (metadata or {}).items()}
         self._channels: dict[str, Channel] = {}
         self._stream = self.part.open("wb")
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = Writer(
+            self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
         self._writer.start(profile=PROFILE, library=f"pneumo_ros {__version__}")
+        for name, values in (metadata or {}).items():
+            self._writer.add_metadata(name, dict(values))
+        self._stream.flush()
         self._queue: deque[tuple[Channel, bytes, int, int]] = deque()
         self._finishing = threading.Event()
         self._lock = threading.Lock()  # topics are registered by callbacks while the thread writes
@@ -116,10 +121,6 @@ class LogWriter:
         self._channels[topic] = Channel(topic, type_name, offered, number)
         return self._channels[topic]
 
-    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A record that explains the run; written when the file is finished. A name given twice is merged."""
-        self._metadata.setdefault(name, {}).update(values)
-
     def write(self, channel: Channel, data: bytes, log_ns: int, publish_ns: int) -> None:
         """Queue one serialised message; never blocks."""
         self.queued += 1
@@ -134,11 +135,10 @@ class LogWriter:
         self._thread.join()
         result = Written(self.path, {c.topic: c.count for c in self._channels.values()}, self._start, self._end,
                          complete and not self._stopped, reason or self._stopped)  # fmt: skip
-        self.add_metadata("session", {"complete": str(result.complete).lower(), "reason": result.reason})
         description = self._bag_description()
         text = yaml.safe_dump(description, sort_keys=False)
-        for name, values in self._metadata.items():
-            self._writer.add_metadata(name, values)
+        end = {"complete": str(result.complete).lower(), "reason": result.reason}
+        self._writer.add_metadata("session", end)
         self._writer.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(
             description["rosbag2_bagfile_information"], sort_keys=False)})  # fmt: skip
         self._writer.finish()
