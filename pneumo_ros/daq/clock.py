@@ -144,8 +144,10 @@ class DeviceClock:
             for device, difference in self._receipts
             if device >= oldest
         ]
-        if gaps:
-            self._correction_ns = min(max(0.0, 0.5 * min(gaps)), self.settings.correction_limit_ns)
+        # A negative gap would be a command that came before it was sent: a receipt noted late. It says nothing.
+        believable = [gap for gap in gaps if gap >= 0.0]
+        if believable:
+            self._correction_ns = min(0.5 * min(believable), self.settings.correction_limit_ns)
 
 
 def _edge_below_mean(points: list[tuple[int, int]]) -> tuple[tuple[int, int], float]:

@@ -66,6 +66,15 @@ class Device:
         self._status_us = now_us
         self._send_hello(0, now_us)
 
+    def power_down(self) -> None:
+        """The outputs without power, which is the safe state."""
+        self._set_safe_outputs()
+
+    @property
+    def samples(self) -> int:
+        """Sequence of the next sample."""
+        return self._sample_sequence
+
     def receive(self, data: bytes, now_us: int) -> None:
         """Bytes from the host, in any portions; ``now_us`` is the device clock, us."""
         for record in self.decoder.feed(data):

@@ -142,7 +142,8 @@ class SerialDriver:
             raise InputError(f"cannot measure a reference in mode {self.core.mode.value}", where=self.port,
                              remedy="deactivate the driver first")  # fmt: skip
         with self._changed:
-            self._collected = taken = []
+            taken: list[Measurement] = []
+            self._collected = taken
             complete = self._changed.wait_for(lambda: len(taken) >= samples, timeout)
             self._collected = None
         if not complete:

@@ -17,7 +17,7 @@ from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig
 from pneumo_ros.road import Road
 
-ROAD_BLOCK = 1000  # samples of the road computed at once
+ROAD_BLOCK = 32  # samples of the road computed at once; a second's worth would make one sample late
 NOISE_BLOCK = 4096
 
 
@@ -96,6 +96,16 @@ class RigSimulation:
             out[scale.places[i]] = min(max(round(exact), scale.low), scale.high)
         return tuple(out)
 
+    def shifted(self, count: int, channel: str, value: float) -> int:
+        """A count as it would be with the sensor off by ``value``, m or Pa."""
+        slope = self._inputs.slopes[SENSORS.index(channel)]
+        return min(max(count + round(value / slope), self._inputs.low), self._inputs.high)
+
+    def warm_up(self) -> None:
+        """Compile what the first period needs, so that it is not late."""
+        self.car.advance(self.state, self._areas, np.zeros((2, 2)), self.period)
+        self._road.sample(np.zeros(1))
+
     def rail(self, side: str) -> int:
         """Counts at the converter's end."""
         return self._inputs.high if side == "high" else self._inputs.low
@@ -122,4 +132,3 @@ class RigSimulation:
             block[:, width:] *= self.settings.converter_noise
             self._noise = block.tolist()[::-1]
         return self._noise.pop()
-
