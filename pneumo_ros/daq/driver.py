@@ -192,9 +192,10 @@ class SerialDriver:
 
     def _read_forever(self) -> None:
         while not self._stop.is_set():
-            port = self._serial
+            with self._changed:
+                self._changed.wait_for(lambda: self._serial is not None, POLL)
+                port = self._serial
             if port is None:
-                self._stop.wait(REOPEN)
                 continue
             try:
                 if not select.select([port.fileno()], [], [], POLL)[0]:
