@@ -178,11 +178,11 @@ def _save_what_is_left(target: Path) -> None:
 def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
     """Table of the active run beside passive valves on the same road, and the picture."""
     from pneumo_ros.session.passive import passive_twin
-    from pneumo_ros.session.summary import load_session, loop_timing, summarise
+    from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
     session = load_session(target)
     other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
-    ours = summarise(session, loop_timing(target))
+    ours = summarise(session, loop_timing(target), wall_time(target))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))
     console.print(timing_table(ours))
