@@ -1,0 +1,1 @@
+"""Thin rclpy shells over the pure code: read parameters, convert messages, call a step, publish."""

@@ -1,0 +1,181 @@
+"""The simulated rig. In lockstep it owns /clock and advances a period once command and road for it are in."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from rclpy.context import Context
+from std_msgs.msg import String
+
+from pneumo_ros.nodes.base import OK, RigNode
+from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.parameters import Parameter, Value
+from pneumo_ros.plant.sensors import NoiseSource, read_channels, truth
+from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.rig import load_rig
+from pneumo_ros.session import topics
+from pneumo_ros.session.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
+from pneumo_ros.session.timing import Deadlines
+
+SECOND = 1_000_000_000
+START_NS = SECOND  # simulation starts at 1 s: to ROS a clock at 0 is a clock that was never set
+PROGRESS_PERIOD = 0.2  # s between progress lines on standard output
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter("duration", 20.0, "s", "length of the session; 0 runs until stopped", 0.0, 86400.0, read_only=True),
+    Parameter("seed", 1, "1", "seed of the sensor noise", 0, 2**31 - 1, read_only=True),
+    Parameter("truth_every", 5, "1", "publish /sim/truth every so many periods", 1, 1000, read_only=True),
+    Parameter("report_progress", False, "", "print the simulated time on standard output", read_only=True),
+)
+
+
+class PlantNode(RigNode):
+    """Thin shell over :mod:`pneumo_ros.plant.half_car`."""
+
+    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
+        super().__init__("plant", PARAMETERS, context=context, overrides=overrides)
+        self.rig = load_rig(self.values["rig"] or None)
+        self.car, trim = nominal_half_car(self.rig)
+        self.state, self.command = trim.state, trim.command
+        self.noise = NoiseSource(self.rig, self.values["seed"])
+        self.last = round(self.values["duration"] * self.values["rate_hz"])
+        self.index = -1
+        self.start_ns = START_NS
+        self.road = np.zeros((2, 2))
+        self._commands: dict[int, tuple[float, ...]] = {}
+        self._roads: dict[int, tuple[float, ...]] = {}
+        self._deadlines: Deadlines | None = None
+        self._next_progress = 0.0
+        self._make_topics()
+
+    def _make_topics(self) -> None:
+        variance = self.rig.pressure_noise.value**2
+        self._displacement = JointEncoder(topics.DISPLACEMENT.frame_id, topics.DISPLACEMENT.names)
+        self._truth = JointEncoder(topics.TRUTH.frame_id, topics.TRUTH.names)
+        self._pressures = [PressureEncoder(t.frame_id, variance) for t in (topics.FRONT_PRESSURE, topics.REAR_PRESSURE)]
+        self._publishers = [
+            self.publisher(t) for t in (topics.DISPLACEMENT, topics.FRONT_PRESSURE, topics.REAR_PRESSURE)
+        ]
+        self._publish_truth = self.publisher(topics.TRUTH).publish
+        self._clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
+        self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
+        self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
+        self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode
+        self.subscribe(topics.COMMAND, self._on_command)
+        self.subscribe(topics.ROAD, self._on_road)
+        self._others_ready: set[str] = set()
+        self.create_subscription(String, topics.READY.name, self._on_ready_message, self.ready_qos())
+
+    # -- start -----------------------------------------------------------------------------------------------------
+
+    def _on_ready_message(self, message: String) -> None:
+        self._others_ready.add(message.data)
+        wanted = set(str(self.values["session_nodes"]).split(","))
+        if self.index < 0 and wanted <= self._others_ready:
+            self._begin()
+
+    def _begin(self) -> None:
+        self.index = 0
+        if not self.lockstep:
+            self.start_ns = time.time_ns()
+            self._deadlines = Deadlines(time.monotonic_ns(), self.period_ns)
+            self.create_timer(self.period_ns / SECOND, self._tick)
+        self.event(OK, "session_started", "first sample", {"start_ns": str(self.start_ns)})
+        self._publish_sample()
+
+    # -- lockstep --------------------------------------------------------------------------------------------------
+
+    def stamp(self, index: int) -> int:
+        """Sample time of a period, ns."""
+        return self.start_ns + index * self.period_ns
+
+    def _on_command(self, data: bytes) -> None:
+        stamp, areas = self._read_command(data)
+        self._commands = {stamp: areas}
+        if self.lockstep:
+            self._advance_if_complete()
+
+    def _on_road(self, data: bytes) -> None:
+        stamp, heights = self._read_road(data)
+        self._roads[stamp] = heights
+        if self.lockstep:
+            self._advance_if_complete()
+
+    def _advance_if_complete(self) -> None:
+        """A period passes when the command for its sample and the road at its end are in."""
+        areas = self._commands.get(self.stamp(self.index))
+        heights = self._roads.get(self.stamp(self.index + 1))
+        if areas is None or heights is None or self.index < 0 or self.finished:
+            return
+        start = time.monotonic_ns()
+        self.command[:] = areas
+        self.road[0] = self._roads.pop(self.stamp(self.index), heights)
+        self.road[1] = heights
+        self._step()
+        self.timed(start)
+
+    # -- real time -------------------------------------------------------------------------------------------------
+
+    def _tick(self) -> None:
+        deadlines = self._deadlines
+        start = time.monotonic_ns()
+        if deadlines is None or not deadlines.due(start) or self.finished:
+            return
+        for areas in self._commands.values():
+            self.command[:] = areas
+        # Skipped periods are simulated, so that the rig keeps pace with the clock; nobody measures in them.
+        for _ in range(deadlines.advance(start)):
+            self._pass_road()
+            self.state = self.car.advance(self.state, self.command, self.road, self.period_ns / SECOND)
+            self.index += 1
+        self._pass_road()
+        self._step()
+        self.timed(start)
+
+    def _pass_road(self) -> None:
+        """Road at both ends of the period; a sample that is not in yet leaves the last height."""
+        self.road[0] = self.road[1]
+        now = self.stamp(self.index + 1)
+        for stamp in [s for s in self._roads if s <= now]:
+            self.road[1] = self._roads.pop(stamp)
+
+    # -- both ------------------------------------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        self.state = self.car.advance(self.state, self.command, self.road, self.period_ns / SECOND)
+        self.index += 1
+        self._publish_sample()
+        if self.last and self.index >= self.last:
+            self.finish("session_complete", "the session's duration has passed")
+
+    def _publish_sample(self) -> None:
+        stamp = self.stamp(self.index)
+        noise = self.noise.next()
+        exact = read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm)
+        values = [e + n for e, n in zip(exact, noise, strict=True)]
+        if self._clock is not None:
+            self._clock(encode_clock(stamp))
+        self._publishers[0].publish(self._displacement.encode(stamp, values[:4]))
+        self._publishers[1].publish(self._pressures[0].encode(stamp, values[4]))
+        self._publishers[2].publish(self._pressures[1].encode(stamp, values[5]))
+        if self.index % self.values["truth_every"] == 0:
+            self._publish_truth(self._truth.encode(stamp, truth(self.car, self.state, self.command, self.road[1])))
+        if self.values["report_progress"] and time.monotonic() > self._next_progress:
+            self._next_progress = time.monotonic() + PROGRESS_PERIOD
+            print(f"PROGRESS {self.index * self.period_ns / SECOND:.3f}", flush=True)
+
+    def finish(self, code: str, message: str) -> None:
+        """End the session."""
+        self.event(OK, code, message, {"samples": str(self.index + 1)})
+        self.finished = True
+
+    def health(self) -> dict[str, str]:
+        """Loop figures and missed deadlines."""
+        missed = self._deadlines.missed if self._deadlines else 0
+        return {**super().health(), "missed periods": str(missed)}
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point of ``plant``."""
+    return node_main(PlantNode, args)

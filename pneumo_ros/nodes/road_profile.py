@@ -1,0 +1,69 @@
+"""Publish the road under both axles, one period ahead of the clock, so that a period's end is known when it starts."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from rclpy.context import Context
+from std_msgs.msg import String
+
+from pneumo_ros.nodes.base import RigNode
+from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.parameters import Value
+from pneumo_ros.rig import load_rig
+from pneumo_ros.road import PARAMETERS, build_road
+from pneumo_ros.session import topics
+from pneumo_ros.session.cdr import JointEncoder, stamp_of
+
+BLOCK = 1024  # samples computed at once
+
+
+class RoadProfileNode(RigNode):
+    """Thin shell over :mod:`pneumo_ros.road`."""
+
+    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
+        super().__init__("road_profile", PARAMETERS, context=context, overrides=overrides)
+        rig = load_rig(self.values["rig"] or None)
+        wanted = {p.name: self.values[p.name] for p in PARAMETERS}
+        self.road = build_road(wanted, wheelbase=rig.wheelbase, where=self.get_name())
+        self._encode = JointEncoder(topics.ROAD.frame_id, topics.ROAD.names, with_velocity=True).encode
+        self._publish = self.publisher(topics.ROAD).publish
+        self._start: int | None = None
+        self._sent = -1
+        self._block = -1
+        self._heights: list[list[float]] = []
+        self._rates: list[list[float]] = []
+        self.subscribe(topics.CLOCK if self.lockstep else topics.DISPLACEMENT, self._on_time)
+
+    def _on_time(self, data: bytes) -> None:
+        start = time.monotonic_ns()
+        # A Clock and a header's stamp begin alike.
+        now = stamp_of(data)
+        if self._start is None:
+            self._start = now
+        index = round((now - self._start) / self.period_ns) + 1
+        for i in range(self._sent + 1, index + 1):
+            self._send(i)
+        self._sent = max(self._sent, index)
+        self.timed(start)
+
+    def _send(self, index: int) -> None:
+        block, row = divmod(index, BLOCK)
+        if block != self._block:
+            period = self.period_ns * 1e-9
+            heights, rates = self.road.sample((block * BLOCK + np.arange(BLOCK)) * period)
+            self._heights, self._rates, self._block = heights.tolist(), rates.tolist(), block
+        assert self._start is not None
+        self._publish(self._encode(self._start + index * self.period_ns, self._heights[row], self._rates[row]))
+
+    def publish_setup(self) -> None:
+        """Parameters and the road's full specification."""
+        super().publish_setup()
+        self._setup.publish(String(data=f"node: {self.get_name()}\n{self.road.spec.to_yaml()}"))
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point of ``road_profile``."""
+    return node_main(RoadProfileNode, args)

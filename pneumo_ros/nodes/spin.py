@@ -1,0 +1,100 @@
+"""Run nodes until they finish or a signal asks to stop; errors end with one line and an exit code."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from types import FrameType
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from pneumo_ros.errors import PneumoError
+from pneumo_ros.nodes.base import RigNode
+
+SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
+TICK_TIMEOUT = 2.0  # s within which a timer must tick on a working executor
+BAD_INPUT = 2
+
+
+class StopRequest:
+    """Set by SIGINT and SIGTERM."""
+
+    def __init__(self) -> None:
+        self.set = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self.set = True
+
+
+def make_executor(kind: str, context: Context | None) -> Executor:
+    """``events`` or ``single``."""
+    return EventsExecutor(context=context) if kind == "events" else SingleThreadedExecutor(context=context)
+
+
+def check_timer_ticks(node: RigNode, executor: Executor) -> bool:
+    """Whether a timer of ``node`` fires on ``executor`` within :data:`TICK_TIMEOUT`."""
+    ticks: list[int] = []
+    timer = node.create_timer(0.001, lambda: ticks.append(1))
+    end = time.monotonic() + TICK_TIMEOUT
+    while not ticks and time.monotonic() < end:
+        executor.spin_once(timeout_sec=SPIN_TIMEOUT)
+    node.destroy_timer(timer)
+    return bool(ticks)
+
+
+def working_executor(nodes: Sequence[RigNode], context: Context | None) -> Executor:
+    """The wished executor, or the single-threaded one if no timer ticks on it."""
+    executor = make_executor(str(nodes[0].values["executor"]), context)
+    for node in nodes:
+        executor.add_node(node)
+    if check_timer_ticks(nodes[0], executor):
+        return executor
+    nodes[0].get_logger().warning("no timer ticks on this executor; falling back to SingleThreadedExecutor")
+    for node in nodes:
+        executor.remove_node(node)
+    executor.shutdown()
+    executor = make_executor("single", context)
+    for node in nodes:
+        executor.add_node(node)
+    return executor
+
+
+def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = None) -> int:
+    """Spin until every node has finished or a stop is asked for; returns the worst exit code."""
+    executor = working_executor(nodes, context)
+    spin_once = executor.spin_once
+    while not stop.set and not any(node.finished for node in nodes):
+        spin_once(timeout_sec=SPIN_TIMEOUT)
+    for node in nodes:
+        node.on_stop(executor)
+    return max(node.exit_code for node in nodes)
+
+
+def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> int:
+    """Entry point of a node's executable."""
+    stop = StopRequest()
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = build()
+        code = spin([node], stop)
+        node.destroy_node()
+    except PneumoError as error:
+        print(f"error: {error}", file=sys.stderr)
+        code = BAD_INPUT
+    except ParameterException as error:
+        print(
+            f"error: {' '.join(str(error).split())}; see the node's parameters in docs/parameters.md", file=sys.stderr
+        )
+        code = BAD_INPUT
+    finally:
+        rclpy.try_shutdown()
+    return code

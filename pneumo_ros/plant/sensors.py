@@ -1,0 +1,69 @@
+"""What the rig's sensors read and what a simulation knows beyond them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area
+from pneumo_ros.plant.half_car import Body, HalfCar, derivative
+from pneumo_ros.rig import Rig
+
+CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
+NOISE_BLOCK = 4096  # rows drawn at once; the sequence does not depend on it
+
+
+def read_channels(state: NDArray[np.float64], front_arm: float, rear_arm: float) -> tuple[float, ...]:
+    """Noise-free readings of :data:`CHANNELS` from a plant state (10,): m above the ground datum, Pa absolute."""
+    heave, pitch = state[0], state[1]
+    return (heave + front_arm * pitch, heave - rear_arm * pitch, state[2], state[3], state[8], state[9])
+
+
+class NoiseSource:
+    """White sensor noise, one row of six channels a sample; the same seed gives the same rows."""
+
+    def __init__(self, rig: Rig, seed: int) -> None:
+        displacement, pressure = rig.displacement_noise.value, rig.pressure_noise.value
+        self._std = np.array([displacement] * 4 + [pressure] * 2)
+        self._rng = np.random.default_rng(seed)
+        self._rows: list[list[float]] = []
+
+    def next(self) -> list[float]:
+        """The next row, m and Pa."""
+        if not self._rows:
+            block = self._rng.standard_normal((NOISE_BLOCK, 6)) * self._std
+            self._rows = block.tolist()[::-1]
+        return self._rows.pop()
+
+
+@njit(cache=True, error_model="numpy")
+def _truth(
+    x: NDArray[np.float64], u: NDArray[np.float64], road: NDArray[np.float64], body: Body, front: Gas, rear: Gas,
+    surface: AreaSurface,
+) -> NDArray[np.float64]:  # fmt: skip
+    state = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9])
+    rates = derivative(state, u[0], u[1], u[2], u[3], road[0], road[1], body, front, rear, surface)
+    out = np.empty(16)
+    out[:10] = x
+    out[10], out[11] = rates[4], rates[5]
+    hf, hr = x[0] + body.front_arm * x[1] - x[2], x[0] - body.rear_arm * x[1] - x[3]
+    out[12] = body.area_scale_front * effective_area(hf, x[8] - front.ambient_pressure, surface)
+    out[13] = body.area_scale_rear * effective_area(hr, x[9] - rear.ambient_pressure, surface)
+    out[14] = body.tyre_stiffness_front * (road[0] - x[2])
+    out[15] = body.tyre_stiffness_rear * (road[1] - x[3])
+    return out
+
+
+def truth(
+    car: HalfCar, state: NDArray[np.float64], command: NDArray[np.float64], road: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(16,): the state, heave and pitch acceleration [m/s2, rad/s2], effective areas [m2], tyre forces [N, up].
+
+    Parameters
+    ----------
+    state : (10,)
+    command : (4,) m2
+    road : (2,) m
+    """
+    return _truth(state, command, road, car.body, car.front, car.rear, car.surface)

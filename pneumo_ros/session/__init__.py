@@ -1,0 +1,1 @@
+"""Session logs: reading, checking and repairing them, and playing them back."""

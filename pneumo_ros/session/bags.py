@@ -1,0 +1,104 @@
+"""The files of a log: one MCAP file, or a folder as ``ros2 bag record`` writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.session.container import (
+    Contents,
+    DamageError,
+    check_magic,
+    mapped,
+    read_blocks,
+    read_header,
+)
+from pneumo_ros.session.records import Gathered, Records, gather
+
+PROFILE = "ros2"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One file: what it declares, and the messages of each wanted channel."""
+
+    contents: Contents
+    records: dict[int, Records]
+
+
+def files_of(path: Path) -> list[Path]:
+    """The MCAP files of a log in recording order.
+
+    Raises
+    ------
+    InputError
+        if the path does not exist or the folder holds no MCAP file.
+    """
+    if not path.exists():
+        raise InputError("no such file or folder", where=path, remedy="give a session log (.mcap) or a bag folder")
+    if not path.is_dir():
+        return [path]
+    listed = _listed(path)
+    files = [path / name for name in listed] if listed else sorted(path.glob("*.mcap"))
+    if not files:
+        raise InputError("the folder holds no .mcap file", where=path, remedy="give the folder that ros2 bag wrote")
+    missing = [file for file in files if not file.exists()]
+    if missing:
+        raise InputError(f"metadata.yaml lists {missing[0].name}, which is not there", where=path)
+    return files
+
+
+def _listed(folder: Path) -> list[str]:
+    try:
+        document = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        names = document["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [str(name) for name in names]
+    except FileNotFoundError:
+        return []  # a killed recorder leaves no metadata.yaml; the files are in name order then
+    except (OSError, yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
+        raise InputError(
+            "metadata.yaml cannot be read", where=folder, remedy="remove it: the .mcap files are then taken by name"
+        ) from error
+
+
+def read_parts(path: Path, topics: Sequence[str] | None) -> list[Part]:
+    """Every file of the log.
+
+    Raises
+    ------
+    InputError
+        see :func:`pneumo_ros.session.reading.read_log`.
+    """
+    return [read_part(file, topics) for file in files_of(path)]
+
+
+def read_part(path: Path, topics: Sequence[str] | None) -> Part:
+    """One MCAP file, strictly.
+
+    Raises
+    ------
+    InputError
+        not MCAP, another profile, truncated or damaged.
+    """
+    with mapped(path) as buffer:
+        check_magic(buffer, path)
+        contents = Contents(path, read_header(buffer, path))
+        if contents.header.profile != PROFILE:
+            raise InputError(
+                "another profile", where=path, key="profile", value=contents.header.profile, allowed=PROFILE
+            )
+        pieces: dict[int, Gathered] = {}
+        total = 0
+        for block in read_blocks(buffer, path, contents):
+            total += gather(block, topics, pieces, contents)
+    statistics = contents.statistics
+    if statistics is not None and statistics.message_count != total:
+        raise DamageError(
+            f"{total} messages found, the summary counts {statistics.message_count}", path, path.stat().st_size
+        )
+    kept = [i for i, channel in contents.channels.items() if topics is None or channel.topic in topics]
+    return Part(contents, {identity: pieces.pop(identity, Gathered()).records() for identity in kept})

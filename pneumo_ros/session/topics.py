@@ -1,0 +1,160 @@
+"""The table of topics: every topic of the graph, its type, contents, units, quality of service and who uses it.
+
+The nodes create their publishers and subscriptions from it; docs/topics.md and msg_tests are made from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Flow(Enum):
+    """Quality of service of a topic (REP 2003), with the reason."""
+
+    STREAM = "reliable, keep last 200, volatile: one sample a control period; the log must not miss one"
+    CLOCK = "best effort in real time, reliable in lockstep, keep last 1: only the newest time matters"
+    LATCHED = "reliable, keep last 1, transient local: a late subscriber still learns it"
+    EVENTS = "reliable, keep last 100, transient local: rare, each one matters, also to a late subscriber"
+    STATUS = "reliable, keep last 10, volatile: periodic health, a lost one is replaced by the next"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic of the graph.
+
+    Attributes
+    ----------
+    name : absolute name
+    type : ROS interface name
+    meaning : what it carries, in a sentence
+    publisher : node that publishes it ('' where any node may)
+    subscribers : nodes that act on it; the recorder takes everything with ``recorded``
+    flow : quality of service
+    frame_id : of the header
+    fields : name -> unit of each value carried (``position`` of a JointState)
+    rates : name -> unit of each value in ``velocity``, where there is one
+    recorded : written to the log
+    """
+
+    name: str
+    type: str
+    meaning: str
+    publisher: str
+    subscribers: tuple[str, ...] = ()
+    flow: Flow = Flow.STREAM
+    frame_id: str = ""
+    fields: tuple[tuple[str, str], ...] = ()
+    rates: bool = False
+    recorded: bool = True
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the values, in the order they are published."""
+        return tuple(name for name, _ in self.fields)
+
+
+JOINT = "sensor_msgs/msg/JointState"
+PRESSURE = "sensor_msgs/msg/FluidPressure"
+STRING = "std_msgs/msg/String"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+
+ROAD = Topic(
+    "/road/profile", JOINT, "commanded road height and its rate under each axle", "road_profile", ("plant",),
+    frame_id="ground", fields=(("front", "m"), ("rear", "m")), rates=True,
+)  # fmt: skip
+DISPLACEMENT = Topic(
+    "/rig/displacement", JOINT, "calibrated LVDTs, upwards from the ground datum, sprung points above each axle",
+    "plant", ("estimator",), frame_id="ground",
+    fields=(("sprung_front", "m"), ("sprung_rear", "m"), ("unsprung_front", "m"), ("unsprung_rear", "m")),
+)  # fmt: skip
+FRONT_PRESSURE = Topic(
+    "/rig/front/pressure", PRESSURE, "front air spring, absolute", "plant", ("estimator",),
+    frame_id="front_air_spring", fields=(("fluid_pressure", "Pa"), ("variance", "Pa2")),
+)  # fmt: skip
+REAR_PRESSURE = Topic(
+    "/rig/rear/pressure", PRESSURE, "rear air spring, absolute", "plant", ("estimator",),
+    frame_id="rear_air_spring", fields=(("fluid_pressure", "Pa"), ("variance", "Pa2")),
+)  # fmt: skip
+COMMAND = Topic(
+    "/valve/command", JOINT, "commanded orifice areas, held until the next", "controller", ("plant",),
+    frame_id="manifold",
+    fields=(("front_inlet", "m2"), ("rear_inlet", "m2"), ("front_outlet", "m2"), ("rear_outlet", "m2")),
+)  # fmt: skip
+ESTIMATE = Topic(
+    "/estimate/state", JOINT, "body and axle motion by robust exact differentiation, pressures, effective areas",
+    "estimator", ("controller",), frame_id="ground",
+    fields=(
+        ("heave", "m"), ("pitch_nose_up", "rad"), ("unsprung_front", "m"), ("unsprung_rear", "m"),
+        ("heave_rate", "m/s"), ("pitch_nose_up_rate", "rad/s"),
+        ("unsprung_front_rate", "m/s"), ("unsprung_rear_rate", "m/s"),
+        ("front_pressure", "Pa"), ("rear_pressure", "Pa"),
+        ("heave_acceleration", "m/s2"), ("pitch_nose_up_acceleration", "rad/s2"),
+        ("front_area", "m2"), ("rear_area", "m2"),
+    ),
+)  # fmt: skip
+SLIDING = Topic(
+    "/controller/sliding", JOINT, "sliding variables, reference and saturation of the controller", "controller",
+    frame_id="manifold",
+    fields=(
+        ("sliding_heave", "m/s"), ("sliding_pitch", "rad/s"), ("reference_heave", "m"),
+        ("reference_pitch_nose_up", "rad"), ("saturated_front", "1"), ("saturated_rear", "1"),
+    ),
+)  # fmt: skip
+TRUTH = Topic(
+    "/sim/truth", JOINT, "what the simulated rig really does (simulation only)", "plant", frame_id="ground",
+    fields=(
+        ("heave", "m"), ("pitch_nose_up", "rad"), ("unsprung_front", "m"), ("unsprung_rear", "m"),
+        ("heave_rate", "m/s"), ("pitch_nose_up_rate", "rad/s"),
+        ("unsprung_front_rate", "m/s"), ("unsprung_rear_rate", "m/s"),
+        ("front_pressure", "Pa"), ("rear_pressure", "Pa"),
+        ("heave_acceleration", "m/s2"), ("pitch_nose_up_acceleration", "rad/s2"),
+        ("front_area", "m2"), ("rear_area", "m2"),
+        ("front_tyre_force", "N"), ("rear_tyre_force", "N"),
+    ),
+)  # fmt: skip
+CLOCK = Topic(
+    "/clock", "rosgraph_msgs/msg/Clock", "simulation time, lockstep only; the plant owns it", "plant",
+    ("road_profile",), flow=Flow.CLOCK, recorded=False,
+)  # fmt: skip
+CONFIG = Topic("/rig/config", STRING, "the rig's parameters with tolerances, YAML", "plant", flow=Flow.LATCHED)
+SETUP = Topic(
+    "/rig/setup", STRING, "parameters of one node at start and after each change, YAML, one message a node and change",
+    "", flow=Flow.EVENTS,
+)  # fmt: skip
+EVENTS = Topic(
+    "/rig/events", DIAGNOSTICS, "trips, life cycle, parameter changes, end of the session; values carry a reason code",
+    "", flow=Flow.EVENTS,
+)  # fmt: skip
+DIAGNOSTIC = Topic(
+    "/diagnostics", DIAGNOSTICS, "health at 1 Hz (REP 107): period and execution time p50, p99, max, missed ticks",
+    "", flow=Flow.STATUS,
+)  # fmt: skip
+READY = Topic(
+    "/rig/ready", STRING, "name of a node whose publishers have all their subscribers", "", ("plant",),
+    flow=Flow.EVENTS, recorded=False,
+)  # fmt: skip
+
+TOPICS: tuple[Topic, ...] = (
+    ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
+    EVENTS, DIAGNOSTIC, READY,
+)  # fmt: skip
+MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
+BY_NAME = {topic.name: topic for topic in TOPICS}
+EVERY_PERIOD = (ROAD, *MEASUREMENTS, COMMAND, ESTIMATE)
+"""Topics that carry exactly one message a control period; a complete log has the same count of each."""
+
+
+def topics_table() -> str:
+    """The table of docs/topics.md, Markdown."""
+    lines = [
+        "| topic | type | values (unit) | from | to | quality of service | meaning |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for t in TOPICS:
+        values = ", ".join(f"{name} ({unit})" for name, unit in t.fields) or "-"
+        to = ", ".join(t.subscribers + (("session_recorder",) if t.recorded else ())) or "-"
+        lines.append(
+            f"| `{t.name}` | {t.type} | {values} | {t.publisher or 'any'} | {to} | {t.flow.value} | {t.meaning} |"
+        )
+    return "\n".join(lines) + "\n"
