@@ -11,7 +11,7 @@ from pneumo_ros.twin.parameters import End
 
 @njit(cache=True)
 def lugre_level(height: float, end: End) -> float:
-    """Share of the friction level that acts at a height: 1 everywhere, unless the guide binds beyond ``bind_height``."""
+    """Share of the friction level that acts at a height: 1, unless the guide binds only beyond ``bind_height``."""
     if end.bind_length <= 0.0:
         return 1.0
     return min(max((height - end.bind_height) / end.bind_length, 0.0), 1.0)

@@ -37,9 +37,7 @@ class Controller(NamedTuple):
 
 
 LEVELLING = Controller()
-ACTIVE = Controller(
-    proportional=3e-6, integral=2e-6, switching=0.35, layer=0.06, slope=4.0, filter_time=0.02
-)
+ACTIVE = Controller(proportional=3e-6, integral=2e-6, switching=0.2, layer=0.06, slope=4.0, filter_time=0.02)
 
 
 @njit(cache=True)

@@ -1,8 +1,8 @@
 """Right-hand side of the richer rig.
 
 State: 0-9 as :mod:`pneumo_ros.plant.half_car`; then one block of 13 for each end (bristle, bellows memory, bellows
-mode and rate, spool and rate, air mass, exciter and rate, line flow and rate, gauge and rate), then tank pressure, loose
-payload and rate, exciter base and rate. A state whose effect is off stays where it starts.
+mode and rate, spool and rate, air mass, exciter and rate, line flow and rate, gauge and rate), then tank pressure,
+loose payload and rate, exciter base and rate. A state whose effect is off stays where it starts.
 """
 
 from __future__ import annotations
@@ -176,7 +176,7 @@ def derivative(
         point = x[0] + frame.loose_arm * x[1]
         point_rate = x[4] + frame.loose_arm * x[5]
         bend, bend_rate = x[LOOSE] - point, x[LOOSE + 1] - point_rate
-        lift = -frame.loose_frequency**2 * bend - 2.0 * frame.loose_damping * frame.loose_frequency * bend_rate
+        lift = -(frame.loose_frequency**2) * bend - 2.0 * frame.loose_damping * frame.loose_frequency * bend_rate
         dx[LOOSE], dx[LOOSE + 1] = x[LOOSE + 1], lift - GRAVITY
         heave, pitch = heave - frame.loose_mass * lift, pitch - frame.loose_mass * lift * frame.loose_arm
     if frame.base_mass > 0.0:

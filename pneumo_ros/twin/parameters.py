@@ -88,7 +88,8 @@ class End(NamedTuple):
     # sensors
     sprung_scale: float = 1.0
     sprung_offset: float = 0.0
-    sprung_curve: float = 0.0  # 1/m, quadratic error
+    sprung_curve: float = 0.0  # 1/m, quadratic error about sprung_centre
+    sprung_centre: float = 0.0  # m
     sprung_play: float = 0.0  # m, half play of the rod end
     unsprung_scale: float = 1.0
     unsprung_offset: float = 0.0

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.twin.air import sonic_mass
 from pneumo_ros.twin.controller import Controller, control
-from pneumo_ros.twin.derivative import BASE, BELLOWS, COLUMN, EXCITER, FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE
-from pneumo_ros.twin.derivative import SPOOL, TANK, derivative
+from pneumo_ros.twin.derivative import FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE, SPOOL, TANK, derivative
 from pneumo_ros.twin.parameters import End, Frame, TwinRig
 from pneumo_ros.twin.valve import delayed, spool_target
 from pneumo_ros.units import GRAVITY
@@ -76,7 +75,8 @@ def _sense_height(true: float, memory: NDArray[np.float64], slot: int, end: End)
     """LVDT on the body: play of its rod end, then scale, offset and curvature."""
     memory[slot] = min(max(memory[slot], true - end.sprung_play), true + end.sprung_play)
     seen = memory[slot]
-    return end.sprung_scale * seen + end.sprung_offset + end.sprung_curve * seen * seen
+    stroke = seen - end.sprung_centre
+    return end.sprung_scale * seen + end.sprung_offset + end.sprung_curve * stroke * stroke
 
 
 @njit(cache=True)
@@ -158,10 +158,14 @@ def run(
             derivative(x, k1, t, duration, spools, outlets, r0, slopes, static, frame, front, rear, surface)
             for m in range(SIZE):
                 probe[m] = x[m] + 0.5 * dt * k1[m]
-            derivative(probe, k2, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface)
+            derivative(
+                probe, k2, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface
+            )
             for m in range(SIZE):
                 probe[m] = x[m] + 0.5 * dt * k2[m]
-            derivative(probe, k3, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface)
+            derivative(
+                probe, k3, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface
+            )
             for m in range(SIZE):
                 probe[m] = x[m] + dt * k3[m]
             derivative(probe, k4, t + dt, duration, spools, outlets, r1, slopes, static, frame, front, rear, surface)

@@ -70,7 +70,8 @@ def _true_top(axle: float, end: End) -> float:
     wanted = end.design_height + seen_axle
 
     def missing(top: float) -> float:
-        return end.sprung_scale * top + end.sprung_offset + end.sprung_curve * top * top - wanted
+        stroke = top - end.sprung_centre
+        return end.sprung_scale * top + end.sprung_offset + end.sprung_curve * stroke * stroke - wanted
 
     return float(brentq(missing, wanted - 0.05, wanted + 0.05, xtol=1e-14))
 

@@ -1,0 +1,150 @@
+"""Which cases a set holds: fixed seeds, fixed mix, in an order that tells nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.twin.catalogue import get, known_effects, unknown_kinds
+
+GRADES = (1.2, 2.0, 5.0, 20.0)
+IMPERFECT_SHARE = 0.35  # of the cases have jitter, lost samples or slower channels
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One case before it is made.
+
+    Attributes
+    ----------
+    name : folder name
+    kind : none, single, pair, unknown (a kind no library has) or withheld (a known effect taken from the library)
+    effects : (id, side) of each effect in it
+    grade : wanted gap over null floor; 0 for none
+    withhold : effect ids that the diagnosis must do without
+    seed : of everything drawn for it
+    imperfect : whether the logger jitters and loses samples
+    size : fixed size of the effects; None: searched so that the grade is met
+    """
+
+    name: str
+    kind: str
+    effects: tuple[tuple[str, str | None], ...]
+    grade: float
+    withhold: tuple[str, ...]
+    seed: int
+    imperfect: bool
+    size: float | None = None
+
+
+@dataclass(frozen=True)
+class Mix:
+    """How many cases of each kind."""
+
+    seed: int
+    none: int
+    single: int
+    pair: int
+    unknown: int
+    withheld: int
+    decoys: int  # cases that also lose an effect they do not have, so that a withheld id gives nothing away
+
+
+SETS: dict[str, Mix] = {
+    "full": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
+    "dev": Mix(1, none=16, single=25, pair=9, unknown=7, withheld=3, decoys=3),
+    "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),
+    "ci": Mix(77, none=1, single=2, pair=1, unknown=1, withheld=1, decoys=0),
+}
+# Effects that are not paired with each other: both move the same number of the same sensor or balance.
+SENSOR = ("lvdt_scale", "lvdt_offset", "pressure_scale", "pressure_offset", "pressure_lag")
+BALANCE = ("leak", "orifice_coefficient", "valve_deadband", "supply_droop")
+LAG = ("valve_lag", "transport_delay")
+MASS = ("payload", "cg_shift", "effective_area_error", "pressure_scale", "pressure_offset")
+RIVALS = (SENSOR, BALANCE, LAG, MASS, ("coulomb_friction", "bellows_hysteresis", "viscous_damping"))
+
+
+def plan(name: str) -> tuple[Planned, ...]:
+    """The cases of a set, in its public order.
+
+    Raises
+    ------
+    InputError
+        if there is no such set.
+    """
+    if name not in SETS:
+        raise InputError("unknown set", key="set", value=name, allowed=", ".join(SETS), remedy="choose one of them")
+    mix = SETS[name]
+    rng = np.random.default_rng(mix.seed)
+    drafts = _none(mix) + _single(mix, rng) + _pairs(mix, rng) + _unknown(mix, rng) + _withheld(mix, rng)
+    drafts = _with_decoys(drafts, mix.decoys, rng)
+    order = rng.permutation(len(drafts))
+    seeds = rng.integers(1, 2**31, len(drafts))
+    imperfect = rng.uniform(size=len(drafts)) < IMPERFECT_SHARE
+    return tuple(
+        Planned(f"{name}-{place:03d}", *drafts[pick], int(seeds[place]), bool(imperfect[place]))
+        for place, pick in enumerate(order)
+    )
+
+
+Draft = tuple[str, tuple[tuple[str, "str | None"], ...], float, tuple[str, ...]]
+
+
+def _none(mix: Mix) -> list[Draft]:
+    return [("none", (), 0.0, ())] * mix.none
+
+
+def _single(mix: Mix, rng: np.random.Generator) -> list[Draft]:
+    ids = known_effects()
+    grid = [(name, grade) for grade in GRADES for name in rng.permutation(ids)]
+    picks = grid[: mix.single] if mix.single >= len(ids) else [grid[i] for i in _spread(len(grid), mix.single, rng)]
+    extra = mix.single - len(picks)
+    picks += [grid[i] for i in rng.choice(len(grid), extra, replace=False)] if extra > 0 else []
+    return [("single", ((str(name), _side(str(name), rng)),), float(grade), ()) for name, grade in picks]
+
+
+def _spread(count: int, wanted: int, rng: np.random.Generator) -> list[int]:
+    """Different effects and all grades: a walk through the grid with a stride."""
+    start = int(rng.integers(count))
+    return [(start + i * (count // wanted + 1)) % count for i in range(wanted)]
+
+
+def _pairs(mix: Mix, rng: np.random.Generator) -> list[Draft]:
+    ids, out = known_effects(), []
+    while len(out) < mix.pair:
+        one, two = (str(name) for name in rng.choice(ids, 2, replace=False))
+        if any(one in group and two in group for group in RIVALS):
+            continue
+        grade = float(rng.choice([2.0, 5.0, 20.0], p=(0.2, 0.4, 0.4)))
+        out.append(("pair", ((one, _side(one, rng)), (two, _side(two, rng))), grade, ()))
+    return out
+
+
+def _unknown(mix: Mix, rng: np.random.Generator) -> list[Draft]:
+    kinds = [str(kind) for kind in rng.permutation(unknown_kinds())]
+    out: list[Draft] = []
+    for i in range(mix.unknown):
+        kind = kinds[i % len(kinds)]
+        out.append(("unknown", ((kind, _side(kind, rng)),), (5.0, 20.0)[(i // len(kinds) + i) % 2], ()))
+    return out
+
+
+def _withheld(mix: Mix, rng: np.random.Generator) -> list[Draft]:
+    ids = rng.choice(known_effects(), mix.withheld, replace=False)
+    return [("withheld", ((str(n), _side(str(n), rng)),), (5.0, 20.0)[i % 2], (str(n),)) for i, n in enumerate(ids)]
+
+
+def _with_decoys(drafts: list[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
+    plain = [i for i, draft in enumerate(drafts) if not draft[3]]
+    for i in rng.choice(plain, count, replace=False):
+        kind, effects, grade, _ = drafts[i]
+        others = [name for name in known_effects() if name not in {e for e, _ in effects}]
+        drafts[i] = (kind, effects, grade, (str(rng.choice(others)),))
+    return drafts
+
+
+def _side(name: str, rng: np.random.Generator) -> str | None:
+    sides = get(name).sides
+    return sides[int(rng.integers(len(sides)))]
