@@ -57,6 +57,7 @@ setup(
         "ros": ROS_WHEELS,
         "cluster": ["distributed>=2024.1"],
         "parquet": ["pyarrow>=15"],
+        "view": ["bokeh>=3.4,<4"],
         "dev": [
             "pytest>=8",
             "pytest-timeout>=2.3",
@@ -66,6 +67,7 @@ setup(
             "types-PyYAML>=6",
             "mcap-ros2-support>=0.5",
             "pandas>=2.1",
+            "selenium>=4.20",
         ],
     },
     data_files=[

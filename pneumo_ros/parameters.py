@@ -1,4 +1,4 @@
-"""Declared parameters: one entry says everything a node, the command line and the docs need to know of a value."""
+"""Declared parameters: one entry says all that a node, the command line and the docs need of a value."""
 
 from __future__ import annotations
 

@@ -22,10 +22,10 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
-from rosidl_runtime_py.utilities import get_message
 from std_msgs.msg import String
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.timing import TimingRecord
@@ -53,6 +53,13 @@ ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+
+
+class StopRequest:
+    """Asks the spinning loop to end; shared by its nodes."""
+
+    def __init__(self) -> None:
+        self.set = False
 
 
 class RigNode(Node):
@@ -84,7 +91,7 @@ class RigNode(Node):
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
         self.period_ns = round(1e9 / self.values["rate_hz"])
-        self.finished = False
+        self.stop = StopRequest()
         self.exit_code = 0
         self.execution, self.interval = TimingRecord(), TimingRecord()
         self._outgoing: list[tuple[Topic, Publisher]] = []
@@ -144,14 +151,14 @@ class RigNode(Node):
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the table."""
-        made = self.create_publisher(get_message(topic.type), topic.name, publisher_qos(topic.flow, self.lockstep))
+        made = self.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic.flow, self.lockstep))
         self._outgoing.append((topic, made))
         return made
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
         """Receive a topic of the table as serialised bytes."""
         qos = subscriber_qos(topic.flow, self.lockstep)
-        self.create_subscription(get_message(topic.type), topic.name, callback, qos, raw=True)
+        self.create_subscription(message_class(topic.type), topic.name, callback, qos, raw=True)
 
     def ready_qos(self) -> QoSProfile:
         """Of /rig/ready, for the node that waits for the others."""

@@ -48,17 +48,18 @@ class PlantNode(RigNode):
         self._deadlines: Deadlines | None = None
         self._next_progress = 0.0
         self._make_topics()
+        # Load the compiled code now: the first period of a real-time session is as short as the others.
+        self.car.advance(self.state, self.command, self.road, 1e-3)
+        truth(self.car, self.state, self.command, self.road[1])
 
     def _make_topics(self) -> None:
         variance = self.rig.pressure_noise.value**2
         self._displacement = JointEncoder(topics.DISPLACEMENT.frame_id, topics.DISPLACEMENT.names)
         self._truth = JointEncoder(topics.TRUTH.frame_id, topics.TRUTH.names)
         self._pressures = [PressureEncoder(t.frame_id, variance) for t in (topics.FRONT_PRESSURE, topics.REAR_PRESSURE)]
-        self._publishers = [
-            self.publisher(t) for t in (topics.DISPLACEMENT, topics.FRONT_PRESSURE, topics.REAR_PRESSURE)
-        ]
+        self._send_measurement = [self.publisher(t).publish for t in topics.MEASUREMENTS]
         self._publish_truth = self.publisher(topics.TRUTH).publish
-        self._clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
+        self._send_clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
         self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
         self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode
@@ -106,7 +107,7 @@ class PlantNode(RigNode):
         """A period passes when the command for its sample and the road at its end are in."""
         areas = self._commands.get(self.stamp(self.index))
         heights = self._roads.get(self.stamp(self.index + 1))
-        if areas is None or heights is None or self.index < 0 or self.finished:
+        if areas is None or heights is None or self.index < 0 or self.stop.set:
             return
         start = time.monotonic_ns()
         self.command[:] = areas
@@ -120,7 +121,7 @@ class PlantNode(RigNode):
     def _tick(self) -> None:
         deadlines = self._deadlines
         start = time.monotonic_ns()
-        if deadlines is None or not deadlines.due(start) or self.finished:
+        if deadlines is None or not deadlines.due(start) or self.stop.set:
             return
         for areas in self._commands.values():
             self.command[:] = areas
@@ -154,13 +155,15 @@ class PlantNode(RigNode):
         noise = self.noise.next()
         exact = read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm)
         values = [e + n for e, n in zip(exact, noise, strict=True)]
-        if self._clock is not None:
-            self._clock(encode_clock(stamp))
-        self._publishers[0].publish(self._displacement.encode(stamp, values[:4]))
-        self._publishers[1].publish(self._pressures[0].encode(stamp, values[4]))
-        self._publishers[2].publish(self._pressures[1].encode(stamp, values[5]))
+        if self._send_clock is not None:
+            self._send_clock(encode_clock(stamp))
+        self._send_measurement[0](self._displacement.encode(stamp, values[:4]))
+        self._send_measurement[1](self._pressures[0].encode(stamp, values[4]))
+        self._send_measurement[2](self._pressures[1].encode(stamp, values[5]))
         if self.index % self.values["truth_every"] == 0:
-            self._publish_truth(self._truth.encode(stamp, truth(self.car, self.state, self.command, self.road[1])))
+            self._publish_truth(
+                self._truth.encode(stamp, truth(self.car, self.state, self.command, self.road[1]).tolist())
+            )
         if self.values["report_progress"] and time.monotonic() > self._next_progress:
             self._next_progress = time.monotonic() + PROGRESS_PERIOD
             print(f"PROGRESS {self.index * self.period_ns / SECOND:.3f}", flush=True)
@@ -168,7 +171,7 @@ class PlantNode(RigNode):
     def finish(self, code: str, message: str) -> None:
         """End the session."""
         self.event(OK, code, message, {"samples": str(self.index + 1)})
-        self.finished = True
+        self.stop.set = True
 
     def health(self) -> dict[str, str]:
         """Loop figures and missed deadlines."""
@@ -179,3 +182,7 @@ class PlantNode(RigNode):
 def main(args: list[str] | None = None) -> int:
     """Entry point of ``plant``."""
     return node_main(PlantNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

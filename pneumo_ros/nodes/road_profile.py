@@ -35,6 +35,7 @@ class RoadProfileNode(RigNode):
         self._block = -1
         self._heights: list[list[float]] = []
         self._rates: list[list[float]] = []
+        self._load(0)
         self.subscribe(topics.CLOCK if self.lockstep else topics.DISPLACEMENT, self._on_time)
 
     def _on_time(self, data: bytes) -> None:
@@ -52,11 +53,13 @@ class RoadProfileNode(RigNode):
     def _send(self, index: int) -> None:
         block, row = divmod(index, BLOCK)
         if block != self._block:
-            period = self.period_ns * 1e-9
-            heights, rates = self.road.sample((block * BLOCK + np.arange(BLOCK)) * period)
-            self._heights, self._rates, self._block = heights.tolist(), rates.tolist(), block
+            self._load(block)
         assert self._start is not None
         self._publish(self._encode(self._start + index * self.period_ns, self._heights[row], self._rates[row]))
+
+    def _load(self, block: int) -> None:
+        heights, rates = self.road.sample((block * BLOCK + np.arange(BLOCK)) * self.period_ns * 1e-9)
+        self._heights, self._rates, self._block = heights.tolist(), rates.tolist(), block
 
     def publish_setup(self) -> None:
         """Parameters and the road's full specification."""
@@ -67,3 +70,7 @@ class RoadProfileNode(RigNode):
 def main(args: list[str] | None = None) -> int:
     """Entry point of ``road_profile``."""
     return node_main(RoadProfileNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

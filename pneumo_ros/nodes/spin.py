@@ -16,18 +16,18 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from pneumo_ros.errors import PneumoError
-from pneumo_ros.nodes.base import RigNode
+from pneumo_ros.nodes.base import RigNode, StopRequest
 
 SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
 TICK_TIMEOUT = 2.0  # s within which a timer must tick on a working executor
 BAD_INPUT = 2
 
 
-class StopRequest:
+class SignalStop(StopRequest):
     """Set by SIGINT and SIGTERM."""
 
     def __init__(self) -> None:
-        self.set = False
+        super().__init__()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
 
@@ -71,9 +71,11 @@ def working_executor(nodes: Sequence[RigNode], context: Context | None) -> Execu
 def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = None) -> int:
     """Spin until every node has finished or a stop is asked for; returns the worst exit code."""
     executor = working_executor(nodes, context)
+    for node in nodes:
+        node.stop = stop
     spin_once = executor.spin_once
-    while not stop.set and not any(node.finished for node in nodes):
-        spin_once(timeout_sec=SPIN_TIMEOUT)
+    while not stop.set:
+        spin_once(SPIN_TIMEOUT)
     for node in nodes:
         node.on_stop(executor)
     return max(node.exit_code for node in nodes)
@@ -81,7 +83,7 @@ def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = 
 
 def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> int:
     """Entry point of a node's executable."""
-    stop = StopRequest()
+    stop = SignalStop()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = build()

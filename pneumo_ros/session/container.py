@@ -23,7 +23,7 @@ from typing import NamedTuple, TypeVar
 
 import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
+from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, Header, Metadata, Schema, Statistics
 
@@ -44,9 +44,9 @@ _DATA_RECORDS = {
 class DamageError(InputError):
     """The container is broken at a known byte; what precedes it can be recovered."""
 
-    def __init__(self, what: str, path: object, offset: int) -> None:
-        self.offset = offset
-        super().__init__(f"{what} at byte {offset}", where=path, remedy=RECOVER)
+    def __init__(self, fault: str, path: object, offset: int) -> None:
+        self.fault, self.offset = fault, offset
+        super().__init__(f"{fault} at byte {offset}", where=path, remedy=RECOVER)
 
 
 class Frame(NamedTuple):
@@ -68,6 +68,7 @@ class Block(NamedTuple):
     data: bytes
     hints: tuple[bytes, ...]  # bodies of the chunk's MessageIndex records; verified before use
     offset: int  # of the chunk in the file
+    size: int  # of the chunk in the file
 
 
 @dataclass
@@ -82,6 +83,24 @@ class Contents:
     attachments: list[Attachment] = field(default_factory=list)
     statistics: Statistics | None = None
     unprotected: bool = False
+    _summary: Contents | None = None
+
+    @property
+    def summary(self) -> Contents:
+        """Schemas and channels as the summary repeats them."""
+        if self._summary is None:
+            self._summary = Contents(self.path, self.header)
+        return self._summary
+
+
+class _ExactStream(ReadDataStream):
+    """The library takes what is left for what was asked; a broken length must not pass as a short text."""
+
+    def read(self, length: int) -> bytes:
+        data: bytes = super().read(length)
+        if len(data) != length:
+            raise EndOfFile
+        return data
 
 
 R = TypeVar("R")
@@ -89,7 +108,7 @@ R = TypeVar("R")
 
 def parse(kind: type[R], body: bytes, path: object, offset: int) -> R:
     """One small record, or a :class:`DamageError` that says where it is."""
-    stream = ReadDataStream(BytesIO(body))
+    stream = _ExactStream(BytesIO(body))
     try:
         record: R = kind.read(stream)  # type: ignore[attr-defined]
     except (McapError, struct.error, UnicodeDecodeError, MemoryError, OverflowError) as error:
@@ -207,7 +226,7 @@ def read_blocks(buffer: mmap.mmap | bytes, path: Path, contents: Contents) -> It
     everything = list(frames(buffer, path))
     data_end = next((i for i, f in enumerate(everything) if f.opcode == Opcode.DATA_END), len(everything) - 1)
     data, summary = everything[:data_end], everything[data_end:]
-    _check_sections(buffer, summary, path, contents)
+    check_sections(buffer, summary, contents)
     _read_small(buffer, data, contents)
     chunks = 0
     for i, frame in enumerate(data):
@@ -218,10 +237,20 @@ def read_blocks(buffer: mmap.mmap | bytes, path: Path, contents: Contents) -> It
     loose = [f for f in data if f.opcode == Opcode.MESSAGE]
     if loose:
         contents.unprotected = True
-        yield Block(b"".join(bytes(buffer[f.start : f.end]) for f in loose), (), loose[0].start)
+        joined = b"".join(bytes(buffer[f.start : f.end]) for f in loose)
+        yield Block(joined, (), loose[0].start, len(joined))
+    _check_against_summary(contents, chunks, summary[0].start)
+
+
+def _check_against_summary(contents: Contents, chunks: int, offset: int) -> None:
+    """What no checksum covers (records outside chunks, whole chunks skipped) must agree with the summary's copy."""
     statistics = contents.statistics
     if statistics is not None and statistics.chunk_count != chunks:
-        raise DamageError(f"{chunks} chunks found, the summary counts {statistics.chunk_count}", path, data[-1].end)
+        raise DamageError(f"{chunks} chunks found, the summary counts {statistics.chunk_count}", contents.path, offset)
+    for kind, ours in (("schemas", contents.schemas), ("channels", contents.channels)):
+        repeated = getattr(contents.summary, kind)
+        if any(repeated.get(identity, record) != record for identity, record in ours.items()):
+            raise DamageError(f"{kind} disagree with the summary's", contents.path, offset)
 
 
 def chunk_block(buffer: mmap.mmap | bytes, frame: Frame, index: Iterable[Frame], contents: Contents) -> Block:
@@ -235,7 +264,7 @@ def chunk_block(buffer: mmap.mmap | bytes, frame: Frame, index: Iterable[Frame],
     chunk = parse(Chunk, bytes(buffer[frame.begin : frame.end]), contents.path, frame.start)
     contents.unprotected |= chunk.uncompressed_crc == 0
     bodies = tuple(bytes(buffer[after.begin : after.end]) for after in index)
-    return Block(decompress(chunk, contents.path, frame.start), bodies, frame.start)
+    return Block(decompress(chunk, contents.path, frame.start), bodies, frame.start, frame.end - frame.start)
 
 
 def _read_small(buffer: mmap.mmap | bytes, data: list[Frame], contents: Contents) -> None:
@@ -264,12 +293,23 @@ def take_record(contents: Contents, opcode: int, body: bytes, offset: int) -> No
     elif opcode == Opcode.METADATA:
         contents.metadata.append(parse(Metadata, body, contents.path, offset))
     elif opcode == Opcode.ATTACHMENT:
+        promised = struct.unpack("<I", body[-4:].rjust(4, b"\0"))[0]
+        if promised and zlib.crc32(body[:-4]) != promised:
+            raise DamageError("CRC error of an attachment", contents.path, offset)
         contents.attachments.append(parse(Attachment, body, contents.path, offset))
 
 
-def _check_sections(buffer: mmap.mmap | bytes, summary: list[Frame], path: Path, contents: Contents) -> None:
-    """CRCs of the data and summary sections; the statistics."""
-    end = summary[0]
+def check_sections(buffer: mmap.mmap | bytes, summary: list[Frame], contents: Contents) -> None:
+    """CRCs of the data and summary sections; keeps the statistics.
+
+    ``summary`` is every record from the end of data (or the summary's first) to the footer.
+
+    Raises
+    ------
+    DamageError
+        if a checksum does not hold.
+    """
+    end, path = summary[0], contents.path
     if end.opcode == Opcode.DATA_END and end.end - end.begin == 4:
         promised = struct.unpack_from("<I", buffer, end.begin)[0]
         if promised and zlib.crc32(memoryview(buffer)[: end.start]) != promised:
@@ -283,8 +323,11 @@ def _check_sections(buffer: mmap.mmap | bytes, summary: list[Frame], path: Path,
         if zlib.crc32(memoryview(buffer)[begin : summary[-1].end - 4]) != footer.summary_crc:
             raise DamageError("CRC error of the summary ending", path, summary[-1].start)
     for frame in summary:
+        body = bytes(buffer[frame.begin : frame.end])
         if frame.opcode == Opcode.STATISTICS:
-            contents.statistics = parse(Statistics, bytes(buffer[frame.begin : frame.end]), path, frame.start)
+            contents.statistics = parse(Statistics, body, path, frame.start)
+        elif frame.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            take_record(contents.summary, frame.opcode, body, frame.start)
 
 
 def read_header(buffer: mmap.mmap | bytes, path: Path) -> Header:

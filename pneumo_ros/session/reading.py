@@ -307,17 +307,27 @@ def read_log(path: str | Path, topics: Sequence[str] | None = None) -> Log:
     InputError
         not a log, another profile, truncated or damaged: with the byte it breaks at and the remedy.
     """
-    parts = read_parts(Path(path), topics)
+    return assemble(Path(path), read_parts(Path(path), topics))
+
+
+def assemble(path: Path, parts: Sequence[Part]) -> Log:
+    """One log of the files that were read.
+
+    Raises
+    ------
+    InputError
+        if a topic was recorded with different definitions.
+    """
     found: dict[str, list[tuple[TopicInfo, Records]]] = {}
     for part in parts:
         for info, records in _topics_of(part):
             found.setdefault(info.name, []).append((info, records))
     infos, joined = {}, {}
     for name in sorted(found):
-        infos[name], joined[name] = _merged(Path(path), found.pop(name))
+        infos[name], joined[name] = _merged(path, found.pop(name))
     contents = [part.contents for part in parts]
     return Log(
-        path=Path(path),
+        path=path,
         profile=contents[0].header.profile,
         library=contents[0].header.library,
         topics=infos,

@@ -82,25 +82,46 @@ COMMAND = Topic(
     fields=(("front_inlet", "m2"), ("rear_inlet", "m2"), ("front_outlet", "m2"), ("rear_outlet", "m2")),
 )  # fmt: skip
 ESTIMATE = Topic(
-    "/estimate/state", JOINT, "body and axle motion by robust exact differentiation, pressures, effective areas",
-    "estimator", ("controller",), frame_id="ground",
+    "/estimate/state",
+    JOINT,
+    "body and spring motion by robust exact differentiation, pressures as measured, effective areas by least squares",
+    "estimator",
+    ("controller",),
+    frame_id="ground",
     fields=(
-        ("heave", "m"), ("pitch_nose_up", "rad"), ("unsprung_front", "m"), ("unsprung_rear", "m"),
-        ("heave_rate", "m/s"), ("pitch_nose_up_rate", "rad/s"),
-        ("unsprung_front_rate", "m/s"), ("unsprung_rear_rate", "m/s"),
-        ("front_pressure", "Pa"), ("rear_pressure", "Pa"),
-        ("heave_acceleration", "m/s2"), ("pitch_nose_up_acceleration", "rad/s2"),
-        ("front_area", "m2"), ("rear_area", "m2"),
+        ("heave", "m"),
+        ("pitch_nose_up", "rad"),
+        ("heave_rate", "m/s"),
+        ("pitch_nose_up_rate", "rad/s"),
+        ("heave_acceleration", "m/s2"),
+        ("pitch_nose_up_acceleration", "rad/s2"),
+        ("front_height", "m"),
+        ("rear_height", "m"),
+        ("front_height_rate", "m/s"),
+        ("rear_height_rate", "m/s"),
+        ("front_height_acceleration", "m/s2"),
+        ("rear_height_acceleration", "m/s2"),
+        ("front_pressure", "Pa"),
+        ("rear_pressure", "Pa"),
+        ("front_area", "m2"),
+        ("rear_area", "m2"),
     ),
-)  # fmt: skip
+)
 SLIDING = Topic(
-    "/controller/sliding", JOINT, "sliding variables, reference and saturation of the controller", "controller",
+    "/controller/sliding",
+    JOINT,
+    "sliding variables, inlet openings before they are clipped to the valve's range, reference model",
+    "controller",
     frame_id="manifold",
     fields=(
-        ("sliding_heave", "m/s"), ("sliding_pitch", "rad/s"), ("reference_heave", "m"),
-        ("reference_pitch_nose_up", "rad"), ("saturated_front", "1"), ("saturated_rear", "1"),
+        ("sliding_heave", "m/s"),
+        ("sliding_pitch", "rad/s"),
+        ("front_inlet_unclipped", "m2"),
+        ("rear_inlet_unclipped", "m2"),
+        ("reference_heave", "m"),
+        ("reference_pitch_nose_up", "rad"),
     ),
-)  # fmt: skip
+)
 TRUTH = Topic(
     "/sim/truth", JOINT, "what the simulated rig really does (simulation only)", "plant", frame_id="ground",
     fields=(

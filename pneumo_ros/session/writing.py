@@ -6,9 +6,9 @@ grows as ``<name>.part`` and gets its name only when footer, metadata and index 
 
 from __future__ import annotations
 
-import queue
 import shutil
 import threading
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -25,6 +25,7 @@ from pneumo_ros.errors import InputError
 CHUNK_BYTES = 192 * 1024  # the writer closes a chunk after the message that exceeds this; every one stays below 256 KiB
 FREE_BYTES_NEEDED = 64 * 1024 * 1024  # below this the file is finished while there is room for its index
 DISK_CHECK_EVERY = 4096  # messages
+BATCH_PERIOD = 0.05  # s between batches of the writing thread
 ROSBAG2_VERSION = 9
 PROFILE = "ros2"
 
@@ -65,7 +66,8 @@ class LogWriter:
     Parameters
     ----------
     path : final name of the file (.mcap)
-    metadata : name -> (key -> text) records that explain the run (config, seeds, versions ...)
+    metadata : name -> (key -> text) records that explain the run (config, seeds, versions ...); written first, so that
+        a log whose recorder was killed still explains itself
 
     :meth:`write` only queues; a thread does the rest. :meth:`finish` must be called, also after an error.
 
@@ -79,15 +81,21 @@ class LogWriter:
         self.path = path
         self.part = path.with_name(path.name + ".part")
         _refuse_bad_target(path)
-        self._metadata = {name: dict(values) for name, values in (metadata or {}).items()}
         self._channels: dict[str, Channel] = {}
         self._stream = self.part.open("wb")
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = Writer(
+            self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
         self._writer.start(profile=PROFILE, library=f"pneumo_ros {__version__}")
-        self._queue: queue.SimpleQueue[tuple[Channel, bytes, int, int] | None] = queue.SimpleQueue()
+        for name, values in (metadata or {}).items():
+            self._writer.add_metadata(name, dict(values))
+        self._stream.flush()
+        self._queue: deque[tuple[Channel, bytes, int, int]] = deque()
+        self._finishing = threading.Event()
         self._lock = threading.Lock()  # topics are registered by callbacks while the thread writes
         self._start, self._end, self._total = 0, 0, 0
         self._stopped = ""
+        self.queued = 0
         self._thread = threading.Thread(target=self._drain, name="log-writer", daemon=True)
         self._thread.start()
 
@@ -113,28 +121,24 @@ class LogWriter:
         self._channels[topic] = Channel(topic, type_name, offered, number)
         return self._channels[topic]
 
-    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A record that explains the run; written when the file is finished. A name given twice is merged."""
-        self._metadata.setdefault(name, {}).update(values)
-
     def write(self, channel: Channel, data: bytes, log_ns: int, publish_ns: int) -> None:
         """Queue one serialised message; never blocks."""
-        self._queue.put((channel, data, log_ns, publish_ns))
+        self.queued += 1
+        self._queue.append((channel, data, log_ns, publish_ns))
 
     def finish(self, complete: bool = True, reason: str = "") -> Written:
         """Write what is queued, metadata and index, and give the file its name.
 
         ``complete=False`` is for a session that ended early; the file is whole, and its metadata says so.
         """
-        self._queue.put(None)
+        self._finishing.set()
         self._thread.join()
         result = Written(self.path, {c.topic: c.count for c in self._channels.values()}, self._start, self._end,
                          complete and not self._stopped, reason or self._stopped)  # fmt: skip
-        self.add_metadata("session", {"complete": str(result.complete).lower(), "reason": result.reason})
         description = self._bag_description()
         text = yaml.safe_dump(description, sort_keys=False)
-        for name, values in self._metadata.items():
-            self._writer.add_metadata(name, values)
+        end = {"complete": str(result.complete).lower(), "reason": result.reason}
+        self._writer.add_metadata("session", end)
         self._writer.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(
             description["rosbag2_bagfile_information"], sort_keys=False)})  # fmt: skip
         self._writer.finish()
@@ -144,10 +148,16 @@ class LogWriter:
         return result
 
     def _drain(self) -> None:
-        while (item := self._queue.get()) is not None:
+        """Write in batches: a thread that woke for each message would fight the callbacks for the interpreter."""
+        while not self._finishing.wait(BATCH_PERIOD):
+            self._write_queued()
+        self._write_queued()
+
+    def _write_queued(self) -> None:
+        while self._queue:
+            channel, data, log_ns, publish_ns = self._queue.popleft()
             if self._stopped:
                 continue
-            channel, data, log_ns, publish_ns = item
             try:
                 if self._total % DISK_CHECK_EVERY == 0:
                     self._check_disk()

@@ -1,0 +1,47 @@
+# `make demo` and `make test` set up everything they need in .venv from the pinned versions of requirements.lock.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export MPLBACKEND ?= Agg
+
+.PHONY: demo test lint types unit bench docs blind lock clean help
+
+help:  ## Show this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
+
+$(READY): requirements.lock setup.py package.xml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: $(READY)  ## A 20 s closed-loop session on a class D road: log, summary, picture
+	$(BIN)/pneumo run --road D --duration 20
+
+test: lint types unit  ## Lint, types and every test
+
+lint: $(READY)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+types: $(READY)
+	$(BIN)/mypy
+
+unit: $(READY)
+	$(BIN)/python -m pytest
+
+bench: $(READY)  ## Every benchmark, side by side with its limit
+	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+docs: $(READY)  ## Write the generated tables of docs/ anew
+	$(BIN)/python -m pneumo_ros.cli.reference
+
+lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
+	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra dev \
+		--no-emit-index-url --no-annotate --no-header --output-file requirements.lock
+
+clean:  ## Remove the virtual environment and what was built
+	rm -rf $(VENV) build *.egg-info bench/build

@@ -1,0 +1,220 @@
+"""``pneumo log``: look into logs, check them, repair, export and compare them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from pneumo_ros.session.comparison import Comparison
+    from pneumo_ros.session.inspection import Report, TopicReport
+    from pneumo_ros.session.repair import Recovery
+    from pneumo_ros.session.salvage import Salvaged
+
+app = typer.Typer(help="Look into a session log, check, repair, export and compare.", no_args_is_help=True)
+console = Console()
+
+LogPath = Annotated[Path, typer.Argument(help="Session log (.mcap) or a folder as `ros2 bag record` writes it.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing output.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+_EVENTS_SHOWN = 40
+_WIDE = 130  # columns from which the types are shown as well
+_LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
+_COLOUR = {"ok": "green", "note": "cyan", "warning": "yellow", "error": "red"}
+FINDINGS_EXIT = 1
+
+
+@app.command()
+def info(log: LogPath, as_json: AsJson = False) -> None:
+    """What a log holds: topics, rates, gaps, jitter, clock jumps, rig, parameters, versions, events."""
+    from pneumo_ros.session.inspection import inspect_log
+    from pneumo_ros.session.reading import read_log
+
+    report = inspect_log(read_log(log))
+    if as_json:
+        typer.echo(json.dumps(asdict(report), indent=2, default=str))
+    else:
+        _show_report(report)
+
+
+@app.command()
+def validate(log: LogPath, as_json: AsJson = False) -> None:
+    """Does the log keep the contract? One line a finding; exit code 1 if it does not."""
+    from pneumo_ros.session.conformance import breaks_contract, check_conformance
+    from pneumo_ros.session.reading import read_log
+
+    findings = check_conformance(read_log(log))
+    if as_json:
+        typer.echo(json.dumps([asdict(f) for f in findings], indent=2))
+    else:
+        for f in findings:
+            console.print(f"[{_COLOUR[f.level]}]{f.level:8}[/] {f.about}: {f.text}", highlight=False, soft_wrap=True)
+        counts = [f"{sum(f.level == level for f in findings)} {level}" for level in ("error", "warning", "note")]
+        console.print(", ".join(counts), highlight=False)
+    if breaks_contract(findings):
+        raise typer.Exit(FINDINGS_EXIT)
+
+
+@app.command()
+def recover(
+    log: LogPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The new log (.mcap); the original is only read.")],
+    overwrite: Overwrite = False,
+) -> None:
+    """Make a readable log of a truncated or corrupted one, and say what was lost."""
+    from pneumo_ros.session.repair import recover as recover_log
+
+    _show_recovery(recover_log(log, output, overwrite))
+
+
+@app.command()
+def export(
+    log: LogPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for one file a topic; made if missing.")],
+    kind: Annotated[str, typer.Option("--format", "-f", help="csv or parquet.")] = "csv",
+    topic: Annotated[list[str] | None, typer.Option("--topic", "-t", help="Only this topic; may be repeated.")] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write topics as tables for pandas: log_time_ns, stamp_ns and one column a channel, SI units."""
+    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.session.tables import export as export_tables
+
+    for path in export_tables(read_log(log), output, kind, topic, overwrite):
+        console.print(str(path), highlight=False, soft_wrap=True)
+
+
+@app.command()
+def compare(
+    first: LogPath,
+    second: Annotated[Path, typer.Argument(help="The log to compare it with.")],
+    as_json: AsJson = False,
+) -> None:
+    """Two logs side by side: topics, settings, and the difference of every signal at equal times."""
+    from pneumo_ros.session.comparison import compare as compare_logs
+    from pneumo_ros.session.reading import read_log
+
+    result = compare_logs(read_log(first), read_log(second))
+    if as_json:
+        typer.echo(json.dumps(asdict(result), indent=2, default=str))
+    else:
+        _show_comparison(result)
+
+
+def _show_report(report: Report) -> None:
+    console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
+    console.print(_topics_table(report.topics))
+    if report.missing_topics:
+        console.print(f"[red]missing topics[/] {', '.join(report.missing_topics)}")
+    if report.unprotected:
+        console.print("[yellow]some content carries no checksum[/]: damage in it cannot be seen")
+    _show_settings(report)
+    _show_events(report)
+
+
+def _topics_table(found: Sequence[TopicReport]) -> Table:
+    wide = console.width >= _WIDE
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("topic", no_wrap=True)
+    if wide:
+        table.add_column("type", no_wrap=True)
+    for title in ("messages", "s", "Hz", "jitter ms", "missing", "delay ms", "clock"):
+        table.add_column(title, justify="right", no_wrap=title not in ("missing", "clock"))
+    for topic in found:
+        table.add_row(topic.name, *([topic.type] if wide else []), *_topic_figures(topic))
+    return table
+
+
+def _topic_figures(topic: TopicReport) -> list[str]:
+    t = topic.timing
+    if t is None:
+        return [str(topic.count), *[""] * 6]
+    clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
+    missing = f"{t.missing} in {len(t.gaps)} gaps, max {t.gaps[0].length:.4g} s" if t.gaps else "0"
+    delay = f"{t.delay_p50 * 1e3:.3g}, {t.delay_p99 * 1e3:.3g}"
+    numbers = [f"{topic.duration:.3f}", f"{t.rate_hz:.6g}", f"{t.jitter * 1e3:.3g}", missing, delay]
+    return [str(topic.count), *numbers, ", ".join(clock) or "ok"]
+
+
+def _show_settings(report: Report) -> None:
+    table = Table("from", "key", "value", title="What explains the run", title_justify="left", box=SIMPLE_HEAD)
+    table.add_row("rig", "name", report.rig or "not in the log")
+    for key, (nominal, ours) in report.changed_parameters.items():
+        table.add_row("rig", key, f"{ours:g} (nominal {nominal:g})")
+    for name, entries in report.metadata:
+        for key, value in entries.items():
+            table.add_row(name, key, value if len(value) < 200 and "\n" not in value else f"({len(value)} characters)")
+    for setup in report.setups:
+        for key, given in setup.parameters.items():
+            table.add_row(f"{setup.node} at {setup.time_ns / 1e9:.3f} s", str(key), str(given)[:200])
+    for name, size in report.attachments:
+        table.add_row("attachment", name, f"{size} bytes")
+    console.print(table)
+
+
+def _show_events(report: Report) -> None:
+    if not report.events:
+        return
+    table = Table("time s", "level", "node", "code", "what", title="Events", title_justify="left", box=SIMPLE_HEAD)
+    for event in report.events[:_EVENTS_SHOWN]:
+        values = ", ".join(f"{k} {v}" for k, v in event.values.items())
+        text = f"{event.message} ({values})" if values else event.message
+        level = _LEVELS.get(event.level, str(event.level))
+        table.add_row(f"{event.time_ns / 1e9:.3f}", level, event.source, event.code, text)
+    console.print(table)
+    if len(report.events) > _EVENTS_SHOWN:
+        console.print(f"... and {len(report.events) - _EVENTS_SHOWN} more (--json shows all)")
+
+
+def _show_recovery(result: Recovery) -> None:
+    from pneumo_ros.session.repair import describe
+
+    found = result.salvaged
+    console.print(f"{result.output}: {result.kept} messages kept, {_lost(found)}", highlight=False, soft_wrap=True)
+    for loss in found.losses:
+        console.print(f"[yellow]lost[/] {describe(loss)}", highlight=False, soft_wrap=True)
+    for note in found.notes:
+        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+
+
+def _lost(found: Salvaged) -> str:
+    if found.expected is not None:
+        return f"{found.lost} of {found.expected} lost"
+    torn = f"; the broken stretches held about {found.lost}" if found.lost else ""
+    return f"how many the log once held is not known{torn}"
+
+
+def _show_comparison(result: Comparison) -> None:
+    for title, names in (("only in the first", result.only_first), ("only in the second", result.only_second)):
+        if names:
+            console.print(f"{title}: {', '.join(names)}", highlight=False)
+    settings = Table(
+        "where", "key", "first", "second", title="Settings that differ", title_justify="left", box=SIMPLE_HEAD
+    )
+    for d in result.settings:
+        settings.add_row(d.where, d.key, str(d.first)[:80], str(d.second)[:80])
+    console.print(settings if result.settings else "same settings")
+    counts = Table("topic", "first", "second", "payload", title="Messages", title_justify="left", box=SIMPLE_HEAD)
+    for name, (a, b) in result.counts.items():
+        counts.add_row(name, str(a), str(b), "equal byte by byte" if name in result.identical else "differs")
+    console.print(counts)
+    signals = Table(title="Signals", title_justify="left", box=SIMPLE_HEAD)
+    signals.add_column("topic and column", no_wrap=True)
+    for title in ("std, first", "std, second", "common", "rms difference", "largest"):
+        signals.add_column(title, justify="right")
+    for s in result.signals:
+        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.4g}", f"{s.largest:.4g}"]
+        signals.add_row(f"{s.topic} {s.column}", *numbers)
+    console.print(signals)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,51 @@
+"""Write the generated tables of docs/: topics and parameters. `make docs` runs it; a test holds them up to date."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pneumo_ros.cli.run import node_tables
+from pneumo_ros.parameters import Parameter
+from pneumo_ros.session.topics import topics_table
+
+TOPICS_HEAD = """# Topics
+
+Made from the table in `pneumo_ros/session/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
+the instant its values hold. `JointState` is used as the stamped, named standard message: its `position` holds the value
+in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position.
+
+"""
+PARAMETERS_HEAD = """# Parameters
+
+Made from the declarations in the code by `make docs`. Set them with `pneumo run --set node.parameter=value`, in a
+ROS 2 parameter file (`--config`), or, where the last column says live, with `ros2 param set` while a session runs; each
+change is logged on `/rig/setup` and `/rig/events`.
+
+"""
+
+
+def parameters_table(table: tuple[Parameter, ...]) -> str:
+    """One node's parameters, Markdown."""
+    lines = ["| parameter | default | unit | allowed | meaning | change |", "|---|---|---|---|---|---|"]
+    for p in table:
+        default = f'"{p.default}"' if isinstance(p.default, str) else str(p.default).lower()
+        when = "at start" if p.read_only else "live"
+        lines.append(f"| `{p.name}` | {default} | {p.unit or '-'} | {p.allowed} | {p.description} | {when} |")
+    return "\n".join(lines) + "\n"
+
+
+def documents() -> dict[str, str]:
+    """File name below docs/ -> text."""
+    parts = [f"## {node}\n\n{parameters_table(table)}" for node, table in node_tables().items()]
+    return {"topics.md": TOPICS_HEAD + topics_table(), "parameters.md": PARAMETERS_HEAD + "\n".join(parts)}
+
+
+def main() -> None:
+    """Write docs/ of this checkout."""
+    folder = Path(__file__).resolve().parents[2] / "docs"
+    for name, text in documents().items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

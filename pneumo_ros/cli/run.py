@@ -1,0 +1,171 @@
+"""`pneumo run`: a session from one command: start, watch, summarise, picture."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from pneumo_ros.cli.tables import summary_table, timing_table
+from pneumo_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from pneumo_ros.session.plan import Tables, Values
+
+app = typer.Typer()
+FAILED = 1
+ALIASES = {"smflc": "first_order_smflc"}
+ROAD_CLASSES = "ABCDEFGH"
+SIM_NODES = ("road_profile", "controller", "estimator", "plant", "session_recorder")
+
+
+@app.command()
+def run(
+    road: Annotated[str, typer.Option(help="ISO class A-H, or sine, sweep, step, bump, flat, or a CSV file.")] = "D",
+    duration: Annotated[float, typer.Option(help="Length of the session, s.")] = 20.0,
+    speed: Annotated[float, typer.Option(help="Full-scale speed, km/h.")] = 80.0,
+    controller: Annotated[str, typer.Option(help="smflc, passive, or another of docs/parameters.md.")] = "smflc",
+    seed: Annotated[int, typer.Option(help="Seed of road and sensor noise.")] = 1,
+    rate: Annotated[float, typer.Option(help="Control rate, Hz.")] = 500.0,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Absolute deadlines instead of lockstep.")] = False,
+    single_process: Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")] = False,
+    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
+    config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
+    set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
+    domain_id: Annotated[
+        int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
+    ] = None,
+    picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
+) -> None:
+    """Run a session: simulate the rig in closed loop and log it."""
+    from pneumo_ros.session.plan import assign, parse_setting, read_config
+
+    tables = node_tables()
+    values = read_config(config, tables) if config else {node: {} for node in tables}
+    options = _options(road, duration, speed, controller, seed, rate, realtime)
+    for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
+        assign(values, tables, node, key, raw, "command line")
+    target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
+    _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": "sim"})
+    _check(values, target)
+    console = Console()
+    _run_session(console, values, single_process, domain_id)
+    _report(console, target, values, picture)
+
+
+def node_tables() -> Tables:
+    """Parameter table of each node of a simulated session."""
+    from pneumo_ros.nodes import controller, estimator, plant, road_profile, session_recorder
+    from pneumo_ros.nodes.base import node_parameters
+
+    modules = {
+        "road_profile": road_profile,
+        "plant": plant,
+        "estimator": estimator,
+        "controller": controller,
+        "session_recorder": session_recorder,
+    }
+    return {name: node_parameters(module.PARAMETERS) for name, module in modules.items()}
+
+
+def _options(
+    road: str, duration: float, speed: float, controller: str, seed: int, rate: float, realtime: bool
+) -> list[tuple[str, str, Any]]:
+    """The command line's options as settings of nodes."""
+    return [
+        *_road_options(road),
+        ("road_profile", "speed_kmh", speed),
+        ("road_profile", "seed", seed),
+        ("plant", "seed", seed),
+        ("plant", "duration", duration),
+        ("plant", "report_progress", True),
+        ("controller", "controller", ALIASES.get(controller, controller)),
+        ("**", "rate_hz", rate),
+        ("**", "mode", "realtime" if realtime else "lockstep"),
+    ]
+
+
+def _road_options(road: str) -> list[tuple[str, str, Any]]:
+    if road.upper() in list(ROAD_CLASSES):
+        return [("road_profile", "kind", "iso"), ("road_profile", "iso_class", road.upper())]
+    if road.lower().endswith(".csv"):
+        return [("road_profile", "kind", "file"), ("road_profile", "path", road)]
+    return [("road_profile", "kind", road)]
+
+
+def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[str, str]) -> None:
+    for own in values.values():
+        if rig is not None:
+            own["rig"] = str(rig.resolve())
+    values["session_recorder"]["output"] = str(target)
+    values["session_recorder"]["session"] = json.dumps({**session, "parameters": json.dumps(values)})
+
+
+def _check(values: Values, target: Path) -> None:
+    """Find every mistake before a process starts: rig, trim, road and output file."""
+    from pneumo_ros.plant.trim import trim
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.road import PARAMETERS, build_road
+
+    rig = load_rig(str(values["plant"].get("rig", "")) or None)
+    trim(rig)
+    own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
+    build_road(own, wheelbase=rig.wheelbase, where="road")
+    if target.suffix != ".mcap":
+        raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
+    if target.exists():
+        raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
+
+
+def _run_session(console: Console, values: Values, single_process: bool, domain_id: int | None) -> None:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
+
+    names = ("single_process",) if single_process else SIM_NODES
+    nodes = [NodeProcess(name, f"pneumo_ros.nodes.{name}") for name in names]
+    lead = "single_process" if single_process else "plant"
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
+               TimeElapsedColumn(), TimeRemainingColumn())  # fmt: skip
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("session", total=float(values["plant"]["duration"]) or None)
+        supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
+        try:
+            with supervisor:
+                supervisor.wait()
+        except SessionError as error:
+            progress.stop()
+            Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
+            raise typer.Exit(FAILED) from error
+        except KeyboardInterrupt:
+            progress.stop()
+            console.print("stopped by the user; the log is finished")
+
+
+def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
+    """Table of the active run beside passive valves on the same road, and the picture."""
+    from pneumo_ros.session.passive import passive_twin
+    from pneumo_ros.session.summary import load_session, loop_timing, summarise
+
+    session = load_session(target)
+    other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
+    ours = summarise(session, loop_timing(target))
+    theirs = summarise(other) if other is not None else None
+    console.print(summary_table(ours, theirs))
+    console.print(timing_table(ours))
+    console.print(f"log      {target}")
+    if picture:
+        from pneumo_ros.session.picture import draw_session
+
+        png = target.with_suffix(".png")
+        draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
+        console.print(f"picture  {png}")
+
+
+if __name__ == "__main__":
+    app()

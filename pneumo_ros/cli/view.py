@@ -1,0 +1,81 @@
+"""``pneumo view``: a session in the browser, recorded or running."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from pneumo_ros.errors import InputError
+
+app = typer.Typer(help="Show a session in the browser: a log played back, or a running session.")
+console = Console()
+
+Host = Annotated[str, typer.Option(help="Address to serve on; anything but this computer needs the token it prints.")]
+Port = Annotated[int, typer.Option(help="Port; 0 takes a free one.", min=0, max=65535)]
+Token = Annotated[str | None, typer.Option(help="Ask every viewer for this token; one is made for other addresses.")]
+
+
+@app.command()
+def view(
+    log: Annotated[
+        Path | None, typer.Argument(help="Session log (.mcap) or bag folder; without one, the running session.")
+    ] = None,
+    host: Host = "127.0.0.1",
+    port: Port = 0,
+    token: Token = None,
+    domain_id: Annotated[
+        int | None, typer.Option(help="DDS domain of the running session; the environment's by default.")
+    ] = None,
+) -> None:
+    """Serve the dashboard and print its address; Ctrl-C ends it."""
+    _need_bokeh()
+    if log is not None:
+        view_log(log, host, port, token)
+    else:
+        view_live(host, port, token, domain_id)
+
+
+def view_log(path: Path, host: str, port: int, token: str | None) -> None:
+    """Play a log back; each browser tab has its own position."""
+    from pneumo_ros.session.dashboard.page import Page
+    from pneumo_ros.session.dashboard.server import serve
+    from pneumo_ros.session.dashboard.source import Playback
+    from pneumo_ros.session.salvage import read_or_salvage
+
+    log, remark = read_or_salvage(path)
+    if remark:
+        console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
+    Playback(log)  # says what is wrong with the log before anybody waits for a page
+    dashboard = serve(lambda document: _keep(Page(document, Playback(log))), host, port, token)
+    console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+    dashboard.run()
+
+
+def view_live(host: str, port: int, token: str | None, domain_id: int | None) -> None:
+    """Show the session that runs on a DDS domain, with its gains and the emergency stop."""
+    from pneumo_ros.nodes.dashboard_link import LiveLink
+    from pneumo_ros.session.dashboard.page import Page
+    from pneumo_ros.session.dashboard.server import serve
+
+    with LiveLink(domain_id) as link:
+        dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)
+        console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)
+        dashboard.run()
+
+
+def _keep(page: object) -> None:
+    """The document holds the page through its callbacks."""
+
+
+def _need_bokeh() -> None:
+    try:
+        import bokeh  # noqa: F401
+    except ImportError as error:
+        raise InputError("the dashboard needs Bokeh", remedy="pip install 'pneumo_ros[view]'") from error
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,1 @@
+"""Controllers: feedback linearisation, model reference and the sliding mode family. Pure steps, explicit state."""

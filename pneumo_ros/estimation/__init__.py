@@ -1,0 +1,1 @@
+"""What cannot be measured: derivatives of displacements and effective areas. Pure steps, explicit state."""

@@ -1,0 +1,92 @@
+"""Command the valves from the estimate; never a value that is not finite, never outside the valve's range."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.context import Context
+
+from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
+from pneumo_ros.control.half_car import Controller, build_controller
+from pneumo_ros.nodes.base import ERROR, RigNode
+from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.parameters import Parameter, Value
+from pneumo_ros.rig import load_rig
+from pneumo_ros.session import topics
+from pneumo_ros.session.cdr import JointDecoder, JointEncoder
+
+PARAMETERS: tuple[Parameter, ...] = (
+    *CONTROL_PARAMETERS,
+    Parameter("telemetry_every", 5, "1", "publish /controller/sliding every so many steps", 1, 1000, read_only=True),
+)
+
+
+class ControllerNode(RigNode):
+    """Thin shell over :mod:`pneumo_ros.control.half_car`."""
+
+    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
+        super().__init__("controller", PARAMETERS, context=context, overrides=overrides)
+        self.rig = load_rig(self.values["rig"] or None)
+        self.controller = self._build()
+        # Load the compiled code now: the first period of a real-time session is as short as the others.
+        self.controller.step(self.controller.init(), np.full(16, 1e-3))
+        self.state: NDArray[np.float64] | None = None
+        self._safe = self.controller.at_rest.command
+        self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode
+        self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode
+        self._publish = self.publisher(topics.COMMAND).publish
+        self._publish_sliding = self.publisher(topics.SLIDING).publish
+        self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode
+        self._steps = 0
+        self._refused = 0
+        self.subscribe(topics.ESTIMATE, self._on_estimate)
+
+    def _build(self) -> Controller:
+        values = {p.name: self.values[p.name] for p in CONTROL_PARAMETERS}
+        return build_controller(self.rig, self.period_ns * 1e-9, values, self.get_name())
+
+    def on_parameters(self, changed: Mapping[str, Value]) -> None:
+        """Rebuild with the new gains; the state goes on, so a change is bumpless."""
+        self.controller = self._build()
+
+    def _on_estimate(self, data: bytes) -> None:
+        start = time.monotonic_ns()
+        stamp, values = self._read(data)
+        estimate = np.array(values)
+        if self.state is None:
+            self.state = self.controller.init(estimate)
+        state, command, telemetry = self.controller.step(self.state, estimate)
+        if math.isfinite(command.sum()):
+            self.state = state
+        else:
+            command = self._refuse(stamp)
+        self._publish(self._command(stamp, command.tolist()))
+        if self._steps % self.values["telemetry_every"] == 0:
+            shown = np.concatenate([telemetry, self.state[[0, 3]]])
+            self._publish_sliding(self._sliding(stamp, shown.tolist()))
+        self._steps += 1
+        self.timed(start)
+
+    def _refuse(self, stamp: int) -> NDArray[np.float64]:
+        """Valves at trim instead of a command that is not finite; said once a second at most."""
+        if self._refused % round(self.values["rate_hz"]) == 0:
+            self.event(ERROR, "command_not_finite", "valves at trim instead", {"stamp_ns": str(stamp)})
+        self._refused += 1
+        return self._safe
+
+    def health(self) -> dict[str, str]:
+        """Loop figures and refused commands."""
+        return {**super().health(), "refused commands": str(self._refused)}
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point of ``controller``."""
+    return node_main(ControllerNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,115 @@
+"""Record every topic of the session as it was sent: raw CDR, written by a thread of its own."""
+
+from __future__ import annotations
+
+import functools
+import json
+import time
+from collections.abc import Callable, Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+
+from rclpy.context import Context
+from rclpy.executors import Executor
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.nodes.base import WARN, RigNode
+from pneumo_ros.nodes.interfaces import message_class
+from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
+from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.parameters import Parameter, Value
+from pneumo_ros.session.cdr import stamp_of
+from pneumo_ros.session.provenance import versions
+from pneumo_ros.session.topics import STRING, TOPICS, Topic
+from pneumo_ros.session.writing import Channel, LogWriter, Written
+
+QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
+PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "every parameter change", "")
+PARAMETERS: tuple[Parameter, ...] = (
+    Parameter("output", "session.mcap", "", "log file to write (.mcap)", read_only=True),
+    Parameter("session", "{}", "", "what else explains the run, a JSON object of texts", read_only=True),
+)
+
+
+class SessionRecorderNode(RigNode):
+    """Thin shell over :mod:`pneumo_ros.session.writing`."""
+
+    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
+        super().__init__("session_recorder", PARAMETERS, context=context, overrides=overrides)
+        self.writer = LogWriter(Path(self.values["output"]), self._metadata())
+        self.written: Written | None = None
+        self._latest = 0
+        self._warned = False
+        for topic in (*(t for t in TOPICS if t.recorded), PARAMETER_EVENTS):
+            self._record(topic)
+
+    def _metadata(self) -> dict[str, dict[str, str]]:
+        try:
+            session = {str(k): str(v) for k, v in json.loads(self.values["session"]).items()}
+        except (ValueError, AttributeError) as error:
+            raise InputError(f"not a JSON object ({error})", where=self.get_name(), key="session") from error
+        started = datetime.now(timezone.utc).isoformat(timespec="seconds")
+        return {
+            "pneumo_ros": {"started_utc": started, "mode": self.values["mode"], "rate_hz": str(self.values["rate_hz"]),
+                           **session},
+            "versions": versions(),
+        }  # fmt: skip
+
+    def _record(self, topic: Topic) -> None:
+        offered = rosbag2_qos(publisher_qos(topic.flow, self.lockstep))
+        channel = self.writer.add_topic(topic.name, topic.type, [offered])
+        stamped = topic.type not in (STRING, PARAMETER_EVENTS.type)
+        self.create_subscription(
+            message_class(topic.type), topic.name, self._callback(channel, stamped), recorder_qos(topic.flow), raw=True
+        )
+
+    def _callback(self, channel: Channel, stamped: bool) -> Callable[[bytes], None]:
+        """What to do with a message of a channel.
+
+        In lockstep a message is logged at its sample time, so that a session that ran at twenty times real time plays
+        back as it was; the health topics carry the computer's time and go to the sample they came with.
+        """
+        write = self.writer.write
+        if self.lockstep and stamped and channel.topic not in ("/rig/events", "/diagnostics"):
+
+            def at_sample_time(data: bytes) -> None:
+                self._latest = stamp = stamp_of(data)
+                write(channel, data, stamp, stamp)
+
+            return at_sample_time
+        return functools.partial(self._on_arrival, channel)
+
+    def _on_arrival(self, channel: Channel, data: bytes) -> None:
+        now = self._latest if self.lockstep else time.time_ns()
+        self.writer.write(channel, data, now, now)
+
+    def health_level(self) -> tuple[bytes, str]:
+        """A warning once nothing is written any more."""
+        if not self.writer.stopped:
+            return super().health_level()
+        if not self._warned:
+            self._warned = True
+            self.event(WARN, "recording_stopped", self.writer.stopped)
+        return WARN, self.writer.stopped
+
+    def on_stop(self, executor: Executor) -> None:
+        """Take what is still in the queues, then finish the file."""
+        self.drain(executor)
+        self.written = self.writer.finish()
+
+    def drain(self, executor: Executor) -> None:
+        """Spin until nothing has come for :data:`QUIET_PERIOD`."""
+        before, quiet_since = -1, time.monotonic()
+        while time.monotonic() - quiet_since < QUIET_PERIOD:
+            executor.spin_once(timeout_sec=0.02)
+            if self.writer.queued != before:
+                before, quiet_since = self.writer.queued, time.monotonic()
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point of ``session_recorder``."""
+    return node_main(SessionRecorderNode, args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,1 @@
+"""The rig in a browser: a recorded session played back, or a running one with gains and an emergency stop."""

@@ -1,0 +1,230 @@
+"""The dashboard's page: plots, status, events, and what the viewer may do. One instance a browser tab."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+from bokeh.document import Document
+from bokeh.layouts import column, gridplot, row
+from bokeh.models import (
+    Button,
+    ColumnDataSource,
+    DataTable,
+    Div,
+    Range1d,
+    Select,
+    Slider,
+    Spinner,
+    TableColumn,
+    Toggle,
+)
+from bokeh.plotting import figure
+
+from pneumo_ros.session.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
+from pneumo_ros.session.dashboard.source import Control, Controls, Playback, Source, Status
+
+REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
+WINDOW = 10.0  # s shown
+POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
+PANEL_HEIGHT = 190  # px
+EVENTS_SHOWN = 200
+ANSWERS_SHOWN = 6
+SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "5", "10")
+_COLOURS = {"playing": "#2a7", "live": "#2a7", "paused": "#777", "waiting": "#c80", "ended": "#36c"}
+_LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
+
+
+class Page:
+    """Widgets of one document, refreshed from a source."""
+
+    def __init__(self, document: Document, source: Source, controls: Controls | None = None) -> None:
+        self._document, self._source, self._controls = document, source, controls
+        self._plots: list[tuple[Panel, Any, list[tuple[Line, ColumnDataSource]]]] = []
+        self._range = Range1d(0.0, WINDOW)
+        self._status = Div(text="", name="status", sizing_mode="stretch_width")
+        self._events = ColumnDataSource({"time": [], "level": [], "source": [], "code": [], "message": []})
+        self._event_count = -1
+        self._last = time.monotonic()
+        self._said: list[str] = []
+        self._answers = Div(text="", name="answers")
+        self._gains = column(name="gains")
+        self._known: tuple[Control, ...] = ()
+        self._position: Slider | None = None
+        self._play: Toggle | None = None
+        document.title = f"pneumo: {source.title}"
+        document.add_root(self._layout())
+        document.add_periodic_callback(self.refresh, REFRESH_MS)
+        self.refresh()
+
+    def _layout(self) -> Any:
+        plots = gridplot(
+            [self._plot(panel) for panel in PANELS], ncols=2, merge_tools=False, sizing_mode="stretch_width",
+            toolbar_location=None,
+        )  # fmt: skip
+        bar = self._live_bar() if self._controls is not None else self._playback_bar()
+        return column(self._status, bar, plots, self._event_table(), sizing_mode="stretch_width")
+
+    def _plot(self, panel: Panel) -> Any:
+        plot = figure(
+            height=PANEL_HEIGHT, title=panel.title, x_range=self._range, sizing_mode="stretch_width",
+            tools="xpan,xwheel_zoom", toolbar_location=None,
+        )  # fmt: skip
+        plot.title.text_font_size = "11px"
+        lines = [(line, ColumnDataSource({"t": [], "y": []})) for line in panel.lines]
+        self._plots.append((panel, plot, lines))
+        for line, data in lines:
+            plot.line("t", "y", source=data, color=line.colour, line_dash=line.dash, legend_label=line.label)
+        plot.legend.label_text_font_size = "9px"
+        plot.legend.location = "top_left"
+        plot.legend.orientation = "horizontal"
+        plot.legend.background_fill_alpha = 0.6
+        plot.legend.padding = 2
+        return plot
+
+    def _event_table(self) -> DataTable:
+        columns = [
+            TableColumn(field=name, title=title, width=width)
+            for name, title, width in (
+                ("time", "time (s)", 90), ("level", "level", 70), ("source", "node", 130), ("code", "code", 170),
+                ("message", "what happened", 800),
+            )
+        ]  # fmt: skip
+        return DataTable(
+            source=self._events, columns=columns, height=180, index_position=None, name="events",
+            sizing_mode="stretch_width",
+        )  # fmt: skip
+
+    # -- playback --------------------------------------------------------------------------------------------------
+
+    def _playback_bar(self) -> Any:
+        source = self._source
+        assert isinstance(source, Playback)
+        length = max((source.end_ns - source.start_ns) * 1e-9, 1e-3)
+        self._play = play = Toggle(label="Play / pause", active=True, button_type="success", name="play", width=110)
+        play.on_change("active", lambda _, __, new: setattr(source, "playing", new))
+        loop = Toggle(label="Loop", active=False, name="loop", width=70)
+        loop.on_change("active", lambda _, __, new: setattr(source, "loop", new))
+        speed = Select(title="", value="1", options=[(s, f"{s} x") for s in SPEEDS], width=80, name="speed")
+        speed.on_change("value", lambda _, __, new: setattr(source, "speed", float(new)))
+        self._position = Slider(start=0.0, end=length, value=0.0, step=length / 1000, title="time (s)", name="position")
+        # Only the viewer's hand moves playback: the refresh sets `value` too, but never `value_throttled`.
+        self._position.on_change("value_throttled", lambda _, __, new: source.seek(new))
+        back, ahead = (Button(label=text, width=60) for text in ("< 20 ms", "20 ms >"))
+        back.on_click(lambda: source.step(-0.02))
+        ahead.on_click(lambda: source.step(0.02))
+        return row(play, loop, speed, back, ahead, self._position)
+
+    # -- live ------------------------------------------------------------------------------------------------------
+
+    def _live_bar(self) -> Any:
+        controls = self._controls
+        assert controls is not None
+        stop = Button(label="EMERGENCY STOP", button_type="danger", width=220, height=60, name="estop")
+        stop.on_click(controls.estop)
+        reset = Button(label="Release stop", width=110, name="reset")
+        reset.on_click(controls.reset)
+        return row(column(stop, reset, self._answers), self._gains)
+
+    def _show_gains(self) -> None:
+        """Widgets for the live parameters, once their nodes have said what they are."""
+        assert self._controls is not None
+        found = tuple(self._controls.parameters())
+        if [c.name for c in found] == [c.name for c in self._known]:
+            return
+        self._known = found
+        widgets = [self._widget(control) for control in found]
+        self._gains.children = [row(*widgets[i : i + 5]) for i in range(0, len(widgets), 5)]
+
+    def _widget(self, control: Control) -> Any:
+        title, name = f"{control.node}.{control.name}", f"set-{control.node}-{control.name}"
+        if control.choices:
+            widget: Any = Select(title=title, value=str(control.value), options=list(control.choices), name=name)
+        elif isinstance(control.value, bool):
+            widget = Toggle(label=title, active=control.value, name=name)
+        else:
+            widget = Spinner(title=title, value=control.value, low=control.low, high=control.high, name=name, width=170)
+            widget.step = max(abs(float(control.value)) / 20.0, 1e-6)
+        widget.on_change("active" if isinstance(widget, Toggle) else "value", self._changer(control))
+        return widget
+
+    def _changer(self, control: Control) -> Callable[[str, object, Any], None]:
+        kind = type(control.value)
+
+        def changed(_: str, __: object, new: Any) -> None:
+            if new is not None and self._controls is not None:
+                self._controls.change(control.node, control.name, kind(new))
+
+        return changed
+
+    # -- refresh ---------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Bring every plot and text up to date."""
+        now = time.monotonic()
+        self._source.tick(now - self._last)
+        self._last = now
+        status = self._source.status()
+        shown = (status.now_ns - status.start_ns) * 1e-9
+        self._document.hold("combine")
+        try:
+            self._status.text = _status_text(self._source.title, status)
+            self._refresh_plots(status.start_ns)
+            end = max(shown, WINDOW)
+            self._range.update(start=end - WINDOW, end=end)
+            self._refresh_events(status.start_ns)
+            if self._position is not None and self._play is not None:
+                self._position.value = round(shown, 3)
+                self._play.active = status.state == "playing"
+            if self._controls is not None:
+                self._show_gains()
+                self._show_answers()
+        finally:
+            self._document.unhold()
+
+    def _refresh_plots(self, start_ns: int) -> None:
+        found = derive(self._source.window(WINDOW), self._source.rig)
+        for panel, plot, lines in self._plots:
+            shown = [self._refresh_line(line, data, found.get(line.source), start_ns) for line, data in lines]
+            plot.title.text = panel.title if any(shown) else f"{panel.title}: not recorded here"
+
+    def _refresh_line(self, line: Line, data: ColumnDataSource, samples: Samples | None, start_ns: int) -> bool:
+        values = samples.column(line.channel) if samples is not None else None
+        if samples is None or values is None:
+            return False
+        t, y = thin((samples.time_ns - start_ns) * 1e-9, values * line.factor, POINTS)
+        data.data = {"t": t, "y": y}
+        return True
+
+    def _refresh_events(self, start_ns: int) -> None:
+        events = self._source.events()
+        if len(events) == self._event_count:
+            return
+        self._event_count = len(events)
+        newest = list(events)[: -EVENTS_SHOWN - 1 : -1]
+        self._events.data = {
+            "time": [f"{(e.time_ns - start_ns) * 1e-9:.3f}" for e in newest],
+            "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
+            "source": [e.source for e in newest],
+            "code": [e.code for e in newest],
+            "message": [e.message + "".join(f", {k} {v}" for k, v in e.values.items()) for e in newest],
+        }
+
+    def _show_answers(self) -> None:
+        assert self._controls is not None
+        new = self._controls.answers()
+        if new:
+            self._said = [*self._said, *new][-ANSWERS_SHOWN:]
+            self._answers.text = "<br>".join(escape(line) for line in self._said)
+
+
+def _status_text(title: str, status: Status) -> str:
+    seconds, length = (status.now_ns - status.start_ns) * 1e-9, (status.end_ns - status.start_ns) * 1e-9
+    colour = _COLOURS[status.state]
+    remark = f", {escape(status.remark)}" if status.remark else ""
+    return (
+        f"<b>{escape(title)}</b> <span style='color:white;background:{colour};padding:2px 8px'>{status.state}</span>"
+        f" <span class='pneumo-time'>{seconds:.2f} s</span> of {length:.2f} s{remark}"
+    )

@@ -1,0 +1,65 @@
+"""Run real sessions in tests, each in a DDS domain of its own."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+_next = itertools.count()
+
+
+def own_domain() -> int:
+    """A domain id no other test of this process uses, 1 to 100 (higher ones reach the ephemeral ports)."""
+    return 1 + (os.getpid() * 13 + next(_next) * 7) % 100
+
+
+def start(*options: str) -> subprocess.Popen[str]:
+    """`pneumo run` with options, in a domain of its own."""
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--domain-id", str(own_domain()), *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def run(*options: str, timeout: float = 120.0) -> tuple[int, str]:
+    """(exit code, what it printed)."""
+    process = start(*options)
+    try:
+        said, _ = process.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        said, _ = process.communicate()
+        raise AssertionError(f"session did not end within {timeout} s; it said:\n{said}") from None
+    return process.returncode, said
+
+
+def wait_for(path: Path, size: int, timeout: float = 60.0) -> None:
+    """Until a file has grown to ``size`` bytes."""
+    end = time.monotonic() + timeout
+    while not path.exists() or path.stat().st_size < size:
+        assert time.monotonic() < end, f"{path} did not grow to {size} bytes"
+        time.sleep(0.02)
+
+
+def children(parent: int) -> dict[str, int]:
+    """Node module name -> process id of a session's processes."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+            owner = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+        except (OSError, IndexError):
+            continue
+        if owner == parent and b"-m" in words:
+            found[words[words.index(b"-m") + 1].decode().rsplit(".", 1)[-1]] = int(entry.name)
+    return found
+
+
+def kill(pid: int) -> None:
+    """SIGKILL."""
+    os.kill(pid, signal.SIGKILL)
