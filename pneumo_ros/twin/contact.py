@@ -18,16 +18,14 @@ def lugre_level(height: float, end: End) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def lugre(bristle: float, speed: float, level: float, end: End) -> tuple[float, float]:
+def lugre(bristle: float, speed: float, end: End) -> tuple[float, float]:
     """Friction force, N (against positive ``speed``), and the bristle's rate, m/s.
 
     Canudas de Wit, Olsson, Astrom, Lischinsky: A new model for control of systems with friction, IEEE TAC 40 (1995).
     The bristle's damping fades with speed, as they advise, so that the model stays dissipative.
     """
     fade = math.exp(-((speed / end.stribeck) ** 2))
-    steady = level * (end.coulomb + (end.static - end.coulomb) * fade)
-    if steady < 1e-6:
-        return 0.0, -100.0 * bristle
+    steady = end.coulomb + (end.static - end.coulomb) * fade
     rate = speed - end.bristle_stiffness * abs(speed) / steady * bristle
     return end.bristle_stiffness * bristle + end.bristle_damping * fade * rate, rate
 

@@ -53,8 +53,8 @@ def suspension_force(
     force -= viscous(speed, end)
     force += hunt_crossley(height, speed, end)
     if end.coulomb > 0.0:
-        friction, dx[at + BRISTLE] = lugre(x[at + BRISTLE], speed, lugre_level(height, end), end)
-        force -= friction
+        friction, dx[at + BRISTLE] = lugre(x[at + BRISTLE], speed, end)
+        force -= lugre_level(height, end) * friction
     if end.bouc_stiffness > 0.0:
         dx[at + BELLOWS] = bouc_wen_rate(x[at + BELLOWS], speed, end)
         force -= end.bouc_stiffness * x[at + BELLOWS]

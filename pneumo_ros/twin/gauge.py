@@ -92,17 +92,20 @@ def gap(model: NDArray[np.float64], seen: Observation) -> float:
     return float(np.sqrt(np.mean(share**2)))
 
 
-def refit(car: HalfCar, seen: Observation, rounds: int = 25) -> tuple[float, NDArray[np.float64]]:
+def refit(
+    car: HalfCar, seen: Observation, start: NDArray[np.float64] | None = None, rounds: int = 25
+) -> tuple[float, NDArray[np.float64]]:
     """Gap that a Levenberg-Marquardt refit of the tolerance parameters leaves, and the parameters' logs.
 
-    Parameters stop at three sigma. The prior weighs one sigma of a parameter like the noise of the whole log in one
+    ``start`` are logs to begin at (those of the same rig without its effect save most of the rounds). Parameters stop
+    at three sigma. The prior weighs one sigma of a parameter like the noise of the whole log in one
     sample: it only keeps apart what the log cannot tell.
     """
     sigma = np.array([s for _, _, s in NUISANCE])
     scale = np.std(seen.measured, axis=0)
     prior = float(np.mean(seen.noise / scale))
-    at, damping = np.zeros(len(sigma)), 1e-2
-    model = free_run(car, seen)
+    at, damping = np.zeros(len(sigma)) if start is None else start / sigma, 1e-2
+    model = free_run(perturbed(car, at * sigma), seen)
     best = gap(model, seen)
     fresh = True
     for _ in range(rounds):
