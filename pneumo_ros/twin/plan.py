@@ -97,18 +97,11 @@ def _none(mix: Mix) -> list[Draft]:
 
 
 def _single(mix: Mix, rng: np.random.Generator) -> list[Draft]:
-    ids = known_effects()
-    grid = [(name, grade) for grade in GRADES for name in rng.permutation(ids)]
-    picks = grid[: mix.single] if mix.single >= len(ids) else [grid[i] for i in _spread(len(grid), mix.single, rng)]
-    extra = mix.single - len(picks)
-    picks += [grid[i] for i in rng.choice(len(grid), extra, replace=False)] if extra > 0 else []
-    return [("single", ((str(name), _side(str(name), rng)),), float(grade), ()) for name, grade in picks]
-
-
-def _spread(count: int, wanted: int, rng: np.random.Generator) -> list[int]:
-    """Different effects and all grades: a walk through the grid with a stride."""
-    start = int(rng.integers(count))
-    return [(start + i * (count // wanted + 1)) % count for i in range(wanted)]
+    """Every effect at every grade as far as the count goes; a smaller set takes each effect once, grades in turn."""
+    ids = [str(name) for name in rng.permutation(known_effects())]
+    laps = [(name, GRADES[(i + lap) % len(GRADES)]) for lap in range(len(GRADES)) for i, name in enumerate(ids)]
+    picks = [laps[i % len(laps)] for i in range(mix.single)]
+    return [("single", ((name, _side(name, rng)),), grade, ()) for name, grade in picks]
 
 
 def _pairs(mix: Mix, rng: np.random.Generator) -> list[Draft]:
