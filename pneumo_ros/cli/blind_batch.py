@@ -79,5 +79,5 @@ def _over_dask(work: Callable[[Item], object], items: Sequence[Item], scheduler:
     with client:
         futures = {client.submit(_attempt, work, item, pure=False): item for item in items}
         for future in finished(list(futures)):
-            error = future.exception() if future.status == "error" else None
-            yield futures[future], str(error) if error is not None else future.result()
+            failure = future.exception() if future.status == "error" else None
+            yield futures[future], str(failure) if failure is not None else future.result()

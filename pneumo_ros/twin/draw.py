@@ -62,16 +62,19 @@ def scenes(rng: np.random.Generator, imperfect: bool) -> tuple[Scene, Scene, Sce
     others = [kind for kind in ROADS if kind != fit_road and not (kind in ISO and fit_road in ISO)]
     held_road, edit_road = str(rng.choice(others)), str(rng.choice(ISO))
     controller = str(rng.choice(["levelling", "active"], p=(0.65, 0.35)))
-    logger = _logger(rng) if imperfect else {}
     seeds = [int(s) for s in rng.integers(1, 2**31, 3)]
     first, second = ("steps", "waves") if rng.uniform() < 0.75 else ("waves", "steps")
     size = rng.uniform(0.22, 0.35)
     fit = Scene(fit_road, rng.uniform(0.85, 1.15), controller, first, size, seeds[0])
     held = Scene(held_road, rng.uniform(0.6, 0.8) if rng.uniform() < 0.7 else rng.uniform(1.2, 1.35),
                  _other(controller, rng), second, 0.7 * size, seeds[1])  # fmt: skip
-    edit = Scene(edit_road, rng.uniform(0.8, 1.0), controller, first, 0.8 * size, seeds[2], **_edit(rng))
-    out = tuple(replace(scene, **logger) for scene in (fit, held, edit))
-    return out[0], out[1], out[2]
+    edit = _edited(Scene(edit_road, rng.uniform(0.8, 1.0), controller, first, 0.8 * size, seeds[2]), rng)
+    if not imperfect:
+        return fit, held, edit
+    jitter, missing = float(rng.uniform(20e-6, 150e-6)), float(rng.uniform(0.0, 0.02))
+    every = int(rng.choice([1, 2]))
+    flawed = [replace(scene, jitter=jitter, missing=missing, pressure_every=every) for scene in (fit, held, edit)]
+    return flawed[0], flawed[1], flawed[2]
 
 
 def _other(controller: str, rng: np.random.Generator) -> str:
@@ -80,18 +83,10 @@ def _other(controller: str, rng: np.random.Generator) -> str:
     return "active" if controller == "levelling" else "levelling"
 
 
-def _edit(rng: np.random.Generator) -> dict[str, float]:
+def _edited(scene: Scene, rng: np.random.Generator) -> Scene:
     if rng.uniform() < 0.6:
-        return {"added_mass": round(float(rng.uniform(2.0, 5.0)), 2)}
-    return {"supply_change": -round(float(rng.uniform(6.0, 14.0)), 1) * PSI}
-
-
-def _logger(rng: np.random.Generator) -> dict[str, float]:
-    return {
-        "jitter": float(rng.uniform(20e-6, 150e-6)),
-        "missing": float(rng.uniform(0.0, 0.02)),
-        "pressure_every": int(rng.choice([1, 2])),
-    }
+        return replace(scene, added_mass=round(float(rng.uniform(2.0, 5.0)), 2))
+    return replace(scene, supply_change=-round(float(rng.uniform(6.0, 14.0)), 1) * PSI)
 
 
 def _normal(rng: np.random.Generator) -> float:

@@ -29,6 +29,7 @@ def road(kind: str, time: NDArray[np.float64], wheelbase: float, gain: float, se
     seed : of the phases
     """
     rng = np.random.default_rng(seed)
+    curve: _Waves | _Sweep
     if kind == "sweep":
         delay, curve = 0.1143, _sweep(rng)
     elif kind == "multisine":

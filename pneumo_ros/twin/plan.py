@@ -84,12 +84,17 @@ def plan(name: str) -> tuple[Planned, ...]:
     seeds = rng.integers(1, 2**31, len(drafts))
     imperfect = rng.uniform(size=len(drafts)) < IMPERFECT_SHARE
     return tuple(
-        Planned(f"{name}-{place:03d}", *drafts[pick], int(seeds[place]), bool(imperfect[place]))
+        _planned(f"{name}-{place:03d}", drafts[pick], int(seeds[place]), bool(imperfect[place]))
         for place, pick in enumerate(order)
     )
 
 
 Draft = tuple[str, tuple[tuple[str, "str | None"], ...], float, tuple[str, ...]]
+
+
+def _planned(name: str, draft: Draft, seed: int, imperfect: bool) -> Planned:
+    kind, effects, grade, withhold = draft
+    return Planned(name, kind, effects, grade, withhold, seed, imperfect)
 
 
 def _none(mix: Mix) -> list[Draft]:
@@ -105,7 +110,8 @@ def _single(mix: Mix, rng: np.random.Generator) -> list[Draft]:
 
 
 def _pairs(mix: Mix, rng: np.random.Generator) -> list[Draft]:
-    ids, out = known_effects(), []
+    ids = known_effects()
+    out: list[Draft] = []
     while len(out) < mix.pair:
         one, two = (str(name) for name in rng.choice(ids, 2, replace=False))
         if any(one in group and two in group for group in RIVALS):

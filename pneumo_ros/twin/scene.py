@@ -90,7 +90,7 @@ def play(rig: TwinRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_ga
     nominal : the rig file the log carries: outlets and noise
     road_gain : extra factor that an effect needs
     """
-    time = PERIOD * np.arange(SAMPLES)
+    time: NDArray[np.float64] = PERIOD * np.arange(SAMPLES, dtype=np.float64)
     changed = rig._replace(
         frame=rig.frame._replace(
             sprung_mass=rig.frame.sprung_mass + scene.added_mass,

@@ -21,8 +21,9 @@ def seal(label: Label, salt: str) -> str:
 
 def sealed(labels: list[Label]) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """(labels each with a salt of its own, case -> digest)."""
-    salted = [{"salt": secrets.token_hex(16), "label": label} for label in labels]
-    return salted, {item["label"]["case"]: seal(item["label"], item["salt"]) for item in salted}
+    salted = [(secrets.token_hex(16), label) for label in labels]
+    entries = [{"salt": salt, "label": label} for salt, label in salted]
+    return entries, {str(label["case"]): seal(label, salt) for salt, label in salted}
 
 
 def opened(labels_file: Path, digests: dict[str, str]) -> dict[str, Label]:
