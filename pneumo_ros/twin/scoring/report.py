@@ -12,7 +12,7 @@ from typing import Any
 from pneumo_ros.twin.scoring import metrics as m
 from pneumo_ros.twin.scoring.baselines import applied
 from pneumo_ros.twin.scoring.calibration import expected_error, reliability, risk_coverage
-from pneumo_ros.twin.scoring.intervals import Share
+from pneumo_ros.twin.scoring.intervals import Share, share
 from pneumo_ros.twin.scoring.metrics import Case, Label, cases_of
 from pneumo_ros.twin.scoring.results import Found
 
@@ -100,7 +100,7 @@ def _table(cases: Sequence[Case], rivals: Mapping[str, Sequence[Case]]) -> str:
 
 def _detection(cases: Sequence[Case], rivals: Mapping[str, Sequence[Case]]) -> str:
     ours, others = m.detection(cases), {name: m.detection(c) for name, c in rivals.items()}
-    right = {g: m.share([c.right for c in cases if c.kind == "single" and c.label["grade"] == g]) for g in ours}
+    right = {g: share([c.right for c in cases if c.kind == "single" and c.label["grade"] == g]) for g in ours}
     rows = [[f"{g:g}", str(ours[g]), str(right[g]), *(_short(o[g]) for o in others.values())] for g in ours]
     return "### Detection and naming against size\n\n" + _markdown(
         ["gap/floor", "alarm", "named rightly", *(f"{n}: alarm" for n in others)], rows
