@@ -113,7 +113,7 @@ def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int,
 
 def _seal(folder: Path, set_name: str, names: Iterable[str]) -> None:
     """Write manifest.json and labels.json; a set that is sealed already keeps its seals."""
-    from pneumo_ros.twin.plan import SETS, plan
+    from pneumo_ros.twin.plan import plan, seed_of
     from pneumo_ros.twin.seal import sealed
 
     if (folder / "manifest.json").exists() and (folder / "labels.json").exists():
@@ -123,7 +123,7 @@ def _seal(folder: Path, set_name: str, names: Iterable[str]) -> None:
     withheld = {case.name: list(case.withhold) for case in plan(set_name)}
     manifest = {
         "set": set_name,
-        "seed": SETS[set_name].seed,
+        "seed": seed_of(set_name),
         "software": f"pneumo_ros {__version__}",
         "cases": [{"name": n, "withhold": withheld[n], "label_sha256": digests[n]} for n in names],
     }

@@ -72,7 +72,7 @@ def _over_dask(work: Callable[[Item], object], items: Sequence[Item], scheduler:
         raise InputError("Dask is not installed", key="--scheduler", value=scheduler,
                          remedy="pip install 'pneumo_ros[cluster]'") from error  # fmt: skip
     try:
-        client = Client(scheduler, timeout="20s")
+        client = Client(scheduler, timeout="8s")
     except OSError as error:
         raise InputError(f"no scheduler answers ({error})", key="--scheduler", value=scheduler,
                          remedy="start one with `dask scheduler`, workers with `dask worker`") from error  # fmt: skip

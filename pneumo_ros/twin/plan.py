@@ -56,14 +56,28 @@ SETS: dict[str, Mix] = {
     "full": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
     "dev": Mix(1, none=16, single=25, pair=9, unknown=7, withheld=3, decoys=3),
     "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),
-    "ci": Mix(77, none=1, single=2, pair=1, unknown=1, withheld=1, decoys=0),
 }
+# Six cases for every change of the code: their sizes are fixed, so that making one is three simulations.
+CI: tuple[Planned, ...] = (
+    Planned("ci-none", "none", (), 0.0, (), 770001, True),
+    Planned("ci-friction", "single", (("coulomb_friction", "both"),), 20.0, (), 770002, False, 0.25),
+    Planned("ci-leak", "single", (("leak", "front"),), 20.0, (), 770003, True, 0.25),
+    Planned("ci-pair", "pair", (("valve_lag", "rear"), ("tyre_damping", "both")), 20.0, (), 770004, False, 0.4),
+    Planned("ci-unknown", "unknown", (("wheel_imbalance", "rear"),), 20.0, (), 770005, False, 0.3),
+    Planned("ci-withheld", "withheld", (("lvdt_scale", "rear"),), 20.0, ("lvdt_scale",), 770006, False, 0.5),
+)
+SEED_OF_CI = 770000
 # Effects that are not paired with each other: both move the same number of the same sensor or balance.
 SENSOR = ("lvdt_scale", "lvdt_offset", "pressure_scale", "pressure_offset", "pressure_lag")
 BALANCE = ("leak", "orifice_coefficient", "valve_deadband", "supply_droop")
 LAG = ("valve_lag", "transport_delay")
 MASS = ("payload", "cg_shift", "effective_area_error", "pressure_scale", "pressure_offset")
 RIVALS = (SENSOR, BALANCE, LAG, MASS, ("coulomb_friction", "bellows_hysteresis", "viscous_damping"))
+
+
+def seed_of(name: str) -> int:
+    """Seed of a set."""
+    return SEED_OF_CI if name == "ci" else SETS[name].seed
 
 
 def plan(name: str) -> tuple[Planned, ...]:
@@ -74,8 +88,11 @@ def plan(name: str) -> tuple[Planned, ...]:
     InputError
         if there is no such set.
     """
+    if name == "ci":
+        return CI
     if name not in SETS:
-        raise InputError("unknown set", key="set", value=name, allowed=", ".join(SETS), remedy="choose one of them")
+        allowed = ", ".join((*SETS, "ci"))
+        raise InputError("unknown set", key="set", value=name, allowed=allowed, remedy="choose one of them")
     mix = SETS[name]
     rng = np.random.default_rng(mix.seed)
     drafts = _none(mix) + _single(mix, rng) + _pairs(mix, rng) + _unknown(mix, rng) + _withheld(mix, rng)
