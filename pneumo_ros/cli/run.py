@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -40,22 +42,30 @@ def run(
     domain_id: Annotated[
         int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
+    ] = False,
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
+    from pneumo_ros.cli.view import beside
     from pneumo_ros.session.plan import assign, parse_setting, read_config
 
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
-    options = _options(road, duration, speed, controller, seed, rate, realtime)
+    options = _options(road, duration, speed, controller, seed, rate, realtime or view)
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
     target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
     _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": "sim"})
     _check(values, target)
     console = Console()
-    _run_session(console, values, single_process, domain_id)
-    _report(console, target, values, picture)
+    with beside(domain_id) if view else nullcontext() as dashboard:
+        _run_session(console, values, target, single_process, domain_id)
+        _report(console, target, values, picture)
+        if dashboard is not None:
+            console.print("the dashboard stays until Ctrl-C")
+            dashboard.wait()
 
 
 def node_tables() -> Tables:
@@ -122,7 +132,7 @@ def _check(values: Values, target: Path) -> None:
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
 
 
-def _run_session(console: Console, values: Values, single_process: bool, domain_id: int | None) -> None:
+def _run_session(console: Console, values: Values, target: Path, single_process: bool, domain_id: int | None) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
@@ -130,10 +140,17 @@ def _run_session(console: Console, values: Values, single_process: bool, domain_
     names = ("single_process",) if single_process else SIM_NODES
     nodes = [NodeProcess(name, f"pneumo_ros.nodes.{name}") for name in names]
     lead = "single_process" if single_process else "plant"
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"),
-               TimeElapsedColumn(), TimeRemainingColumn())  # fmt: skip
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f} s of {task.fields[length]}"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    length = float(values["plant"]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("session", total=float(values["plant"]["duration"]) or None)
+        task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # both end the session in order
         supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
         try:
             with supervisor:
@@ -141,20 +158,40 @@ def _run_session(console: Console, values: Values, single_process: bool, domain_
         except SessionError as error:
             progress.stop()
             Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
+            _save_what_is_left(target)
             raise typer.Exit(FAILED) from error
         except KeyboardInterrupt:
             progress.stop()
             console.print("stopped by the user; the log is finished")
 
 
+def _save_what_is_left(target: Path) -> None:
+    """Say where the log is; if its recorder died, make a readable one of what it had written."""
+    from pneumo_ros.session.repair import recover
+
+    out = Console(stderr=True, highlight=False, soft_wrap=True)
+    part = target.with_name(target.name + ".part")
+    if target.exists():
+        out.print(f"log until then: {target}")
+        return
+    if not part.exists():
+        return
+    try:
+        found = recover(part, target.with_suffix(".recovered.mcap"))
+    except InputError as error:
+        out.print(f"the recorder left nothing that can be read: {error}")
+        return
+    out.print(f"recovered {found.kept} messages: {found.output}")
+
+
 def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
     """Table of the active run beside passive valves on the same road, and the picture."""
     from pneumo_ros.session.passive import passive_twin
-    from pneumo_ros.session.summary import load_session, loop_timing, summarise
+    from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
     session = load_session(target)
     other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
-    ours = summarise(session, loop_timing(target))
+    ours = summarise(session, loop_timing(target), wall_time(target))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))
     console.print(timing_table(ours))

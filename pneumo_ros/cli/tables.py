@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -61,7 +62,8 @@ def _change(ours: list[float], theirs: list[float]) -> str:
 
 def timing_table(summary: Summary) -> Table:
     """Period and execution time of each node's loop, ms, from its last /diagnostics."""
-    table = Table(title="Loop timing, ms: p50, p99, max", title_justify="left", box=box.SIMPLE)
+    speed = f", at {summary.speed:.1f} x real time" if math.isfinite(summary.speed) else ""
+    table = Table(title=f"Loop timing{speed}; ms: p50, p99, max", title_justify="left", box=box.SIMPLE)
     for column in ("node", "steps", "period", "", "", "step", "", "", "missed"):
         table.add_column(column, justify="left" if column == "node" else "right", no_wrap=True)
     for node, values in summary.loop.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -28,7 +29,8 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.timing import TimingRecord
+from pneumo_ros.session.supervisor import SUPERVISOR
+from pneumo_ros.session.timing import LoopTiming
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
@@ -56,10 +58,14 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 
 class StopRequest:
-    """Asks the spinning loop to end; shared by its nodes."""
+    """Asks the spinning loop to end; shared by its nodes.
+
+    ``failed`` says that the session ended because something broke, not because it was over.
+    """
 
     def __init__(self) -> None:
         self.set = False
+        self.failed = False
 
 
 class RigNode(Node):
@@ -93,9 +99,8 @@ class RigNode(Node):
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
-        self.execution, self.interval = TimingRecord(), TimingRecord()
+        self.timing = LoopTiming()
         self._outgoing: list[tuple[Topic, Publisher]] = []
-        self._last_step = 0
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -192,23 +197,27 @@ class RigNode(Node):
     # -- health ----------------------------------------------------------------------------------------------------
 
     def timed(self, start_ns: int) -> None:
-        """Account for one step that began at ``start_ns`` (monotonic)."""
-        if self._last_step:
-            self.interval.add((start_ns - self._last_step) * 1e-9)
-        self._last_step = start_ns
-        self.execution.add((time.monotonic_ns() - start_ns) * 1e-9)
+        """Account for one step that began at ``start_ns`` (monotonic) and ends now."""
+        self.timing.mark(start_ns, time.monotonic_ns())
 
     def health(self) -> dict[str, str]:
         """Key figures of /diagnostics; nodes add theirs."""
-        return {"steps": str(self.execution.count), **self.interval.summary("period"), **self.execution.summary("step")}
+        return self.timing.summary()
 
     def health_level(self) -> tuple[bytes, str]:
         """(level, message) of /diagnostics."""
         return OK, "running" if self.ready else "waiting for the session"
 
     def _publish_diagnostics(self) -> None:
+        self._end_if_alone()
         level, message = self.health_level()
         self._diagnostics.publish(self._array(level, f"{self.get_name()}: loop", message, self.health()))
+
+    def _end_if_alone(self) -> None:
+        """A node must not drive valves for a session whose supervisor was killed."""
+        supervisor = os.environ.get(SUPERVISOR)
+        if supervisor and os.getppid() != int(supervisor):
+            self.stop.failed = self.stop.set = True
 
     def event(self, level: bytes, code: str, message: str, values: Mapping[str, str] | None = None) -> None:
         """Publish an event; ``code`` is its reason code."""

@@ -20,12 +20,14 @@ import yaml
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.parameters import Value
 
+SUPERVISOR = "PNEUMO_SUPERVISOR"  # environment variable: process whose end ends the nodes as well
 PROGRESS = "PROGRESS "
 POLL = 0.02  # s
 STOP_PATIENCE = 5.0  # s a process has to end after SIGINT before it is killed
 RECORDER_PATIENCE = 60.0  # s; a slow disk may still be taking the log
 START_PATIENCE = 60.0  # s until the first sample; the first start on a machine compiles the plant
 RECORDER = "session_recorder"
+END_REASON = "PNEUMO_END_REASON"  # environment variable: file in which the supervisor says why a session failed
 
 
 class SessionError(PneumoError):
@@ -88,6 +90,8 @@ class Supervisor:
         self._environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         if domain_id is not None:
             self._environment["ROS_DOMAIN_ID"] = str(domain_id)
+        self._environment[END_REASON] = str(Path(self._folder.name) / "end_reason")
+        self._environment[SUPERVISOR] = str(os.getpid())
         self._progress = -1.0
 
     def __enter__(self) -> Supervisor:
@@ -102,8 +106,8 @@ class Supervisor:
             threading.Thread(target=self._listen, args=(node, node.process.stdout), daemon=True).start()
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.stop()
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        self.stop(str(error) if isinstance(error, SessionError) else "")
         self._folder.cleanup()
 
     def wait(self) -> None:
@@ -130,13 +134,19 @@ class Supervisor:
                 raise SessionError(f"no first sample within {START_PATIENCE:.0f} s; is another session on this domain?")
             time.sleep(POLL)
 
-    def stop(self) -> None:
-        """End every process: SIGINT, patience, SIGKILL; the recorder after the others, so that it hears them out."""
+    def stop(self, failure: str = "") -> None:
+        """End every process: a signal, patience, SIGKILL; the recorder after the others, so that it hears them out.
+
+        ``failure`` says why the session failed; the recorder writes it into the log.
+        """
+        if failure:
+            Path(self._environment[END_REASON]).write_text(failure, encoding="utf-8")
+        number = signal.SIGTERM if failure else signal.SIGINT
         others = [n for n in self.nodes if n.name != RECORDER]
         recorders = [n for n in self.nodes if n.name == RECORDER]
         for group, patience in ((others, STOP_PATIENCE), (recorders, RECORDER_PATIENCE)):
             for node in group:
-                _signal(node, signal.SIGINT)
+                _signal(node, number)
             end = time.monotonic() + patience
             for node in group:
                 _wait_or_kill(node, end)
