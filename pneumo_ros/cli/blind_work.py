@@ -31,4 +31,7 @@ def diagnose_case(item: tuple[str, tuple[str, ...], str, str]) -> None:
 
 
 def _diagnosis(case: Path, withhold: tuple[str, ...]) -> dict[str, object]:
-    raise NotImplementedError
+    from pneumo_ros.gap.run import diagnose_files
+
+    found = diagnose_files([case / "fit.mcap"], case / "holdout.mcap", edit=case / "edit.mcap", without=list(withhold))
+    return dict(found.to_json())

@@ -124,8 +124,18 @@ def side_right(cases: Sequence[Case]) -> Share:
     for c in of_kind(cases, "single", clear=True):
         side = c.label["truth"][0]["side"]
         if c.right and side is not None:
-            flags.append(c.found.best.get("side") == side)
+            flags.append(_stated_side(c) == side)
     return share(flags)
+
+
+def _stated_side(case: Case) -> str | None:
+    """Side of the verdict's ranking entry; for a sensor effect, whose side is its channel, the end of its places."""
+    side = case.found.best.get("side")
+    if side is not None or not case.found.places[:1] or not case.found.places[0].startswith("sensor:"):
+        return side
+    channels = [place for place in case.found.places[: len(case.places)] if place.startswith("sensor:")]
+    ends = {end for end in ("front", "rear") for channel in channels if end in channel}
+    return "both" if len(ends) == 2 else next(iter(ends), None)
 
 
 def place_right(cases: Sequence[Case]) -> Share:
