@@ -217,8 +217,9 @@ def _area_error(r: Run, settings: ThesisSettings) -> float:
     first = round(1.0 / settings.period)
     x, estimated = r.states[first:-1], r.estimates[first:, 14:]
     heights = (x[:, 0] + car.body.front_arm * x[:, 1] - x[:, 2], x[:, 0] - car.body.rear_arm * x[:, 1] - x[:, 3])
+    ambient = car.front.ambient_pressure
     true = np.column_stack([
-        [effective_area(h, p - car.front.ambient_pressure, car.surface) for h, p in zip(height, x[:, 8 + i], strict=True)]
+        [effective_area(h, p - ambient, car.surface) for h, p in zip(height, x[:, 8 + i], strict=True)]
         for i, height in enumerate(heights)
     ])  # fmt: skip
     return rms(estimated - true)
