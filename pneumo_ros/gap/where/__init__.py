@@ -3,6 +3,8 @@
 from pneumo_ros.gap.where.conditional import conditional_gaps as conditional_gaps
 from pneumo_ros.gap.where.habitat import Habitat as Habitat
 from pneumo_ros.gap.where.habitat import habitat as habitat
+from pneumo_ros.gap.where.law import Law as Law
+from pneumo_ros.gap.where.law import missing_law as missing_law
 from pneumo_ros.gap.where.locate import Location as Location
 from pneumo_ros.gap.where.locate import Start as Start
 from pneumo_ros.gap.where.locate import locate as locate

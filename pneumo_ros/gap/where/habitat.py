@@ -35,10 +35,14 @@ class Habitat:
 
     @property
     def text(self) -> str:
-        """For example "front_air, mostly with the inlet nearly closed, at 1-4 Hz"."""
+        """For example "in fast motion (90 % of it in 50 % of the time), mostly at 1-4 Hz"."""
         low, high, share = self.band
-        when = "in every regime" if self.regime is None else f"mostly with {self.regime.label}"
-        return f"{self.place}, {when} ({100 * share:.0f} % of it at {low:g}-{high:g} Hz)"
+        where = f"{100 * share:.0f} % of it at {low:g}-{high:g} Hz"
+        if self.regime is None:
+            return f"it shows in every regime, {where}"
+        r = self.regime
+        held = f"{100 * r.gap_share:.0f} % of it in {100 * r.time_share:.0f} % of the time"
+        return f"it shows mostly in one regime, {r.label}: {held}; {where}"
 
 
 def habitat(location: Location, error: Array | None = None, place: str | None = None) -> Habitat:
