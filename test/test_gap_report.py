@@ -28,13 +28,20 @@ def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
     clean, road, commands = simulated(5.0, 3)
     log = signals_of(clean, road, commands, 3, "held<out>.mcap")
     best = {
-        "effects": ["leak"], "side": "front", "probability": probability, "gap_after": 0.01, "shrink": 0.975,
+        "effects": ["leak"], "side": "front", "sites": ["front"], "probability": probability, "gap_after": 0.01,
+        "shrink": 0.975,
         "shrink_ci90": [0.96, 0.99], "parameters": {"leak_area": {"value": 4.1e-7, "std": 2e-9, "unit": "m2"}},
     }  # fmt: skip
     summary = {
         "verdict": verdict, "probability": probability,
         "location": [{"place": "front_air", "share": 0.93}, {"place": "supply", "share": 0.04}],
-        "ranking": [best], "ambiguity_group": ["orifice_coefficient"],
+        "ranking": [best, {**best, "effects": ["supply_droop"], "sites": [""], "side": None, "probability": 0.0,
+                           "notes": ["droop ended at its bound"]}],
+        "ambiguity_group": ["orifice_coefficient"], "not_testable": {"bump_stop": "the spring never came near it"},
+        "next_experiment": {"name": "x", "description": "Open both inlets fully.", "separation": 31.0,
+                            "separation_now": 1.2},
+        "edit_test": {"log": "heavier.mcap", "changes": {"sprung_mass": 1.1}, "gap_nominal": 1.3, "gap_refit": 0.5,
+                      "gap_best": 0.02},
         "gap": {"nominal": 1.2, "refit": 0.4, "best": 0.01, "noise_floor": 0.0034,
                 "per_channel": {name: {"nominal": 1.2, "refit": 0.4, "best": 0.01} for name in MEASURED}},
     }  # fmt: skip
@@ -80,6 +87,9 @@ def test_the_page_says_verdict_place_size_and_shrink() -> None:
     assert "the front air and valve" in page and "93 %" in page
     assert "0.4100 ± 0.0020" in page and "mm²" in page
     assert "orifice_coefficient: an orifice" in page
+    assert "Open both inlets fully. It would drive the rivals 31 times the noise apart" in page
+    assert "droop ended at its bound" in page and "not testable here: the spring never came near it" in page
+    assert "heavier.mcap (sprung mass x 1.1): gap 1.3 nominal, 0.5 re-estimated, 0.02" in page
     assert "held&lt;out&gt;.mcap" in page and "held<out>" not in page
 
 
@@ -99,9 +109,9 @@ def test_every_kind_of_verdict_has_its_sentence(verdict: str, said: str) -> None
 def test_a_pair_is_named_with_both_effects() -> None:
     summary = dict(findings().summary)
     summary |= {"verdict": "leak+valve_lag"}
-    summary["ranking"] = [{**summary["ranking"][0], "effects": ["leak", "valve_lag"], "side": "both"}]
+    summary["ranking"] = [{**summary["ranking"][0], "effects": ["leak", "valve_lag"], "sites": ["front", "both"]}]
     words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve"})
-    assert words == "A leak at both ends and a slow valve at both ends."
+    assert words == "A leak at the front and a slow valve at both ends."
 
 
 @pytest.mark.parametrize("place", PLACES)

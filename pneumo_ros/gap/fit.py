@@ -124,11 +124,12 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     columns = np.empty((*state.residual.shape, len(state.x)))
     if borrowed is not None:
         columns[:, :, :first] = borrowed
+    here = problem.predict_coarse(state.candidate, state.x)
     for m in range(first, len(state.x)):
         step = STEP if state.x[m] + STEP <= high[m] else -STEP
         moved = state.x.copy()
         moved[m] += step
-        column = (problem.residual(state.candidate, moved) - state.residual) / step
+        column = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
         columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
     return columns
 

@@ -45,8 +45,10 @@ def effect_shares(
 def _pieces(model: Model, one: Active) -> list[Active]:
     """An effect at both ends, as one at each."""
     sites = model.effects[one.effect].sites
-    if one.site == "both" and {"front", "rear"} <= set(sites):
+    if one.site == "both" and "front" in sites:
         return [Active(one.effect, end, one.values) for end in ("front", "rear")]
+    if one.site == "both":
+        return [Active(one.effect, channel, one.values) for channel in sites if channel != "both"]
     return [one]
 
 

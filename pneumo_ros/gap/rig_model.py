@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,8 +30,13 @@ if TYPE_CHECKING:
     from pneumo_ros.gap.signals import Signals
 
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
+COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
 JUMP = 12.0  # medians of the command's change from row to row
 SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
+# The log stamps commands no finer than a sample and says nothing of the bus: a shift of all commands within a sample is no
+# effect.
+COMMAND_DELAY = "command_delay"
+COMMAND_DELAY_STD = 4e-4  # s
 _NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 # Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. The volume's
@@ -80,7 +85,7 @@ class RigModel:
 
     channels = CHANNELS
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Nuisance parameters; a quantity without tolerance is exact and stays."""
         found = []
@@ -88,9 +93,10 @@ class RigModel:
             q = getattr(self.rig, source)
             if q.std > 0.0:
                 found.append(Parameter(name, q.unit, q.value, q.std))
+        found.append(Parameter(COMMAND_DELAY, "s", 0.0, COMMAND_DELAY_STD))
         return tuple(found)
 
-    @property
+    @cached_property
     def effects(self) -> Mapping[str, Effect]:
         """The effects that compete."""
         return {name: effect for name, effect in self.library.items() if name not in self.withheld}
@@ -98,14 +104,15 @@ class RigModel:
     def places(self, active: Active) -> tuple[str, ...]:
         """Places touched, first the one blamed."""
         effect = self.library[active.effect]
-        if active.site in SENSOR_PLACES:
-            return (SENSOR_PLACES[active.site],)
+        if effect.outputs is not None:
+            return tuple(SENSOR_PLACES[CHANNELS[channel]] for channel in channels_of(active.site))
         ends = [end for end, on in zip(("front", "rear"), ends_of(active.site), strict=True) if on]
         return tuple(dict.fromkeys(place.format(end=end) for place in effect.places for end in ends))
 
     def side(self, active: Active) -> str | None:
         """The end for an effect of an end; None for the whole rig and for sensors (their place names the channel)."""
-        return active.site if active.site in ("front", "rear", "both") else None
+        on_an_end = self.library[active.effect].outputs is None and active.site in ("front", "rear", "both")
+        return active.site if on_an_end else None
 
     def initial(self, record: Signals, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         """State at the record's first row: the measured one, seen through the active sensor effects."""
@@ -155,13 +162,16 @@ class RigModel:
         """States of :mod:`pneumo_ros.plant.half_car`, (rows or N, 10)."""
         count = len(record.measured) if rows is None else rows
         inputs = Inputs(record.commands[: count - 1], record.road[:count])
+        if nuisance is not None:
+            late = float(nuisance[[p.name for p in self.parameters].index(COMMAND_DELAY)])
+            inputs = inputs._replace(commands=_shifted(inputs.commands, late / record.period))
         for one in active:
             effect = self.library[one.effect]
             if effect.inputs is not None:
                 inputs = effect.inputs(inputs, record.period, ends_of(one.site), one.values)
         start = self.initial(record, active)[0] if initial is None else initial
         plant = self.plant(nuisance, active)
-        steps = substeps(record.period, self.step)
+        steps = 1 if self.step < record.period <= COARSEST else substeps(record.period, self.step)
         commands, road = np.ascontiguousarray(inputs.commands), np.ascontiguousarray(inputs.road)
         terms = [one for one in active if self.library[one.effect].term is not None]
         if not terms and correction is None:
@@ -169,6 +179,18 @@ class RigModel:
         held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
         on, values = self._switches(terms)
         return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+
+    def coarse(self, record: Signals) -> Signals:
+        """Every other row, commands averaged in pairs: half the steps, true to 1 % of a sensitivity."""
+        rows = len(record.measured) // 2 * 2
+        return replace(
+            record,
+            period=2.0 * record.period,
+            measured=record.measured[:rows:2],
+            weight=record.weight[:rows:2],
+            commands=record.commands[:rows].reshape(-1, 2, 4).mean(axis=1),
+            road=record.road[:rows:2],
+        )
 
     def changes(self, record: Signals) -> dict[str, float]:
         """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
@@ -195,28 +217,27 @@ class RigModel:
 
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""
-        values = None if nuisance is None else tuple(float(v) for v in nuisance)
-        names = tuple(p.name for p in self.parameters) if values else ()
-        plant = _plant(self.rig, self.step, names, values or ())
+        v = {} if nuisance is None else dict(zip((p.name for p in self.parameters), map(float, nuisance), strict=True))
+        plant = _plant(self.rig, self._base, v)
         for one in active:
             effect = self.library[one.effect]
             if effect.plant is not None:
                 plant = effect.plant(plant, ends_of(one.site), one.values)
         return plant
 
-    @property
+    @cached_property
     def slots(self) -> tuple[Slot, ...]:
         """Terms of the library in the kernel's order."""
         return tuple(
             Slot(e.id, e.term, len(e.parameters)) for _, e in sorted(self.library.items()) if e.term is not None
         )
 
-    @property
+    @cached_property
     def kernel(self) -> Compiled:
         """The library's compiled kernel."""
         return _kernel(self.slots)
 
-    @property
+    @cached_property
     def _base(self) -> HalfCar:
         return _base(self.rig, self.step)
 
@@ -241,10 +262,18 @@ def _base(rig: Rig, step: float) -> HalfCar:
     return half_car(rig, trim(rig).pressures, step=step)
 
 
-@lru_cache(maxsize=64)
-def _plant(rig: Rig, step: float, names: tuple[str, ...], values: tuple[float, ...]) -> Plant:
-    base = _base(rig, step)
-    v = dict(zip(names, values, strict=True))
+def _shifted(commands: Array, samples: float) -> Array:
+    """Held commands a part of a sample later (positive) or earlier, as means over the rows."""
+    share = min(abs(samples), 1.0)
+    moved = np.empty_like(commands)
+    if samples >= 0.0:
+        moved[1:], moved[0] = commands[:-1], commands[0]
+    else:
+        moved[:-1], moved[-1] = commands[1:], commands[-1]
+    return (1.0 - share) * commands + share * moved
+
+
+def _plant(rig: Rig, base: HalfCar, v: Mapping[str, float]) -> Plant:
     body = base.body
     body = body._replace(
         **{name: v[name] for name in body._fields if name in v},
@@ -279,7 +308,10 @@ def _channels(states: Array, body: Body) -> Array:
     """(..., 10) -> (..., 6): sprung points above the axles, axles, pressures."""
     heave, pitch = states[..., 0], states[..., 1]
     front, rear = heave + body.front_arm * pitch, heave - body.rear_arm * pitch
-    return np.stack([front, rear, states[..., 2], states[..., 3], states[..., 8], states[..., 9]], axis=-1)
+    out = np.empty((*states.shape[:-1], 6))
+    out[..., 0], out[..., 1] = front, rear
+    out[..., 2:4], out[..., 4:6] = states[..., 2:4], states[..., 8:10]
+    return out
 
 
 def _ends_rates(state: Array, body: Body) -> Array:

@@ -25,6 +25,7 @@ class Thresholds:
     ----------
     first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
     first_cost, second_cost : fall of the training cost that it must bring
+    least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
     """
@@ -33,6 +34,7 @@ class Thresholds:
     second: float = 0.2
     first_cost: float = 15.0
     second_cost: float = 20.0
+    least: float = 0.3
     model_form: float = 0.03
 
 
@@ -91,8 +93,9 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
             continue
         best = _simplest(rivals)
         poorer = chosen
-        evidence = advantage(poorer, best) > gain and poorer.fit.cost - best.fit.cost > cost
-        beyond_form = poorer.level - best.level > limits.model_form**2 * refit.level
+        fallen = poorer.level - best.level
+        evidence = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
+        beyond_form = fallen > limits.model_form**2 * refit.level
         if evidence and (size == 1 or beyond_form):
             chosen = best
     return chosen

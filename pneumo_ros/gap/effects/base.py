@@ -30,6 +30,7 @@ ENDS = ("front", "rear", "both")
 RIG = ("",)
 LVDTS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear")
 PRESSURES = ("front_pressure", "rear_pressure")
+PRESSURES_OR_BOTH = (*PRESSURES, "both")
 CHANNELS = LVDTS + PRESSURES
 SENSOR_PLACES = {
     "front_pressure": "sensor:front_pressure",
@@ -97,8 +98,8 @@ def ends_of(site: str) -> Ends:
 
 
 def channels_of(site: str) -> tuple[int, ...]:
-    """Columns of the measured channels that a sensor effect's site covers."""
-    return (CHANNELS.index(site),)
+    """Columns of the measured channels that a sensor effect's site covers; "both" are the two pressures."""
+    return tuple(CHANNELS.index(name) for name in (PRESSURES if site == "both" else (site,)))
 
 
 def with_gas(plant: Plant, ends: Ends, change: Callable[[Gas], Gas]) -> Plant:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import PRESSURES, Array, Effect, Values
+from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Values
 from pneumo_ros.gap.effects.filters import first_order_line
 from pneumo_ros.gap.model import EffectParameter
 
@@ -17,7 +17,7 @@ def outputs(outputs: Array, period: float, channels: tuple[int, ...], values: Va
 EFFECT = Effect(
     id="pressure_lag",
     summary="a pressure sensor reports late",
-    sites=PRESSURES,
+    sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(EffectParameter("sensor_lag", "s", 0.0, 0.2, 0.008, size=True, starts=(0.03,)),),
     outputs=outputs,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import PRESSURES, Array, Effect, Values
+from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Values
 from pneumo_ros.gap.model import EffectParameter
 
 
@@ -21,7 +21,7 @@ def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
 EFFECT = Effect(
     id="pressure_offset",
     summary="a pressure sensor's zero is off",
-    sites=PRESSURES,
+    sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(EffectParameter("offset", "Pa", -6e4, 6e4, 2e3, size=True),),
     outputs=outputs,

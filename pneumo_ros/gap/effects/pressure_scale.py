@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import PRESSURES, Array, Effect, Values
+from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Values
 from pneumo_ros.gap.model import EffectParameter
 from pneumo_ros.units import ATMOSPHERE
 
@@ -22,7 +22,7 @@ def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
 EFFECT = Effect(
     id="pressure_scale",
     summary="a pressure sensor's sensitivity is off",
-    sites=PRESSURES,
+    sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(
         EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),

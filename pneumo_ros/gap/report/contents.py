@@ -78,6 +78,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "parameters": _parameters(summary),
         "ambiguity": _ambiguity(summary, found.phrases),
         "experiment": summary.get("next_experiment"),
+        "edit": _edit(summary),
         "refused": _refused(summary),
         "notes": [_sentence(note) for note in summary.get("notes", [])],
         "limitations": [limit.text for limit in found.holdout.limitations],
@@ -102,7 +103,7 @@ def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
         location = summary.get("location") or [{"place": "an unclear place"}]
         return f"Something that no listed effect explains, at {place_words(location[0]['place'])}."
     entry = _winner(summary)
-    sides = entry.get("sides") or [entry.get("side")] * len(entry["effects"])
+    sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
     parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
     return _sentence(" and ".join(parts))
 
@@ -224,11 +225,16 @@ def _zoom(log: Signals, refit: Array) -> tuple[int, int]:
     return first, first + rows
 
 
+def _sides(entry: Mapping[str, Any]) -> str:
+    sites = [site.replace("_", " ") for site in entry.get("sites", []) if site]
+    return ", ".join(dict.fromkeys(sites)) or str(entry.get("side") or "")
+
+
 def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str, Any]:
     low, high = entry["shrink_ci90"]
     return {
         "name": " + ".join(entry["effects"]),
-        "side": entry.get("side") or "",
+        "side": _sides(entry),
         "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
         "probability": float(entry["probability"]),
         "gap": float(entry["gap_after"]),
@@ -297,13 +303,23 @@ def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[s
     ]
 
 
+def _edit(summary: Mapping[str, Any]) -> str:
+    test = summary.get("edit_test")
+    if not test:
+        return ""
+    changes = ", ".join(f"{name.replace('_', ' ')} x {factor:.3g}" for name, factor in test["changes"].items())
+    return (
+        f"Predicted without refitting on {test['log']} ({changes or 'nothing changed'}): gap {test['gap_nominal']:.3g} "
+        f"nominal, {test['gap_refit']:.3g} re-estimated, {test['gap_best']:.3g} with the best explanation."
+    )
+
+
 def _refused(summary: Mapping[str, Any]) -> list[dict[str, str]]:
-    out = []
-    for entry in summary.get("refused", []):
-        if isinstance(entry, Mapping):
-            effects = entry.get("effects") or [entry.get("effect", "")]
-            side = entry.get("side")
-            out.append({"name": " + ".join(effects) + (f" ({side})" if side else ""), "why": str(entry.get("why", ""))})
-        else:
-            out.append({"name": "", "why": str(entry)})
-    return out
+    """Explanations that something counts against, and those that this log could not have shown."""
+    out = [
+        {"name": " + ".join(entry["effects"]), "side": entry.get("side") or "", "why": "; ".join(entry["notes"])}
+        for entry in summary.get("ranking", [])
+        if entry.get("notes")
+    ]
+    hidden: Mapping[str, str] = summary.get("not_testable") or {}
+    return out + [{"name": name, "side": "", "why": f"not testable here: {why}"} for name, why in hidden.items()]

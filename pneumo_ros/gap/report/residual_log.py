@@ -69,7 +69,7 @@ def _write_inputs(writer: LogWriter, log: Signals, stamps: NDArray[np.int64]) ->
     store = get_typestore(Stores.ROS2_JAZZY)
     text = store.types[STRING](data=log.rig.to_yaml())
     data = bytes(store.serialize_cdr(text, STRING))
-    writer.write(writer.add_topic(CONFIG, STRING), data, int(stamps[0]), int(stamps[0]))
+    writer.write(writer.add_topic(CONFIG, STRING), data, int(stamps[0]))
     _write_joints(writer, ROAD.name, ROAD.frame_id, ROADS, stamps, log.road)
     _write_joints(writer, COMMAND.name, COMMAND.frame_id, COMMANDS, stamps, log.commands)
 
@@ -79,7 +79,7 @@ def _write_channels(writer: LogWriter, prefix: str, stamps: NDArray[np.int64], v
     for column, topic in ((4, FRONT_PRESSURE), (5, REAR_PRESSURE)):
         channel, encoder = writer.add_topic(prefix + topic.name, PRESSURE), PressureEncoder(topic.frame_id, 0.0)
         for stamp, value in zip(stamps.tolist(), values[:, column].tolist(), strict=True):
-            writer.write(channel, encoder.encode(stamp, value), stamp, stamp)
+            writer.write(channel, encoder.encode(stamp, value), stamp)
 
 
 def _write_joints(
@@ -88,4 +88,4 @@ def _write_joints(
     channel: Channel = writer.add_topic(topic, JOINT)
     encoder = JointEncoder(frame_id, names)
     for stamp, row in zip(stamps.tolist(), values.tolist(), strict=True):
-        writer.write(channel, encoder.encode(stamp, row), stamp, stamp)
+        writer.write(channel, encoder.encode(stamp, row), stamp)
