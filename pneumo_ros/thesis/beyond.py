@@ -28,9 +28,11 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
     step("area rate feedforward and two valves")
     o = dict(zip(RUNS, run_all(measure, [(settings, e) for e in RUNS.values()]), strict=True))
     lead = (
-        "The thesis takes dA/dt as zero and commands the inlets alone. With the 2M2A's surface known, the estimator finds "
+        "The thesis takes dA/dt as zero and commands the inlets alone. With the 2M2A's surface known, the estimator "
+        "finds "
         "the error of the read height instead of the area, accelerations follow from pressures and areas without a "
-        "differentiator's lag, and dA/dt can be fed forward. All runs: the rig's sensors, volume believed 4 in3, heights "
+        "differentiator's lag, and dA/dt can be fed forward. All runs: the rig's sensors, volume believed 4 in3, "
+        "heights "
         "read 0.2 in too large, the same valve limits."
     )
     claims = [*_claims(o), _limit_claim(settings, o["two_valve"])]
@@ -54,7 +56,8 @@ def _claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:
                     "7.2",
                     f"{name}: at least 30 % lower heave rms than {base}, every road, tyre load no worse",
                     "-",
-                    f"{100 * min(falls):.0f} to {100 * max(falls):.0f} % lower, tyre load variation {100 * (tyre - 1):+.0f} %",
+                    f"{100 * min(falls):.0f} to {100 * max(falls):.0f} % lower, tyre load variation "
+                    f"{100 * (tyre - 1):+.0f} %",
                     min(falls) >= WANTED and tyre <= 1.0,
                     _why(name, base) if min(falls) < WANTED else "",
                 )
@@ -64,7 +67,7 @@ def _claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:
 
 def _why(name: str, base: str) -> str:
     if name == "area_rate_feedforward":
-        return "one valve with a constant outlet empties the spring at most at 2e6 Pa/s; more than a quarter of dA/dt drives it there"
+        return "one valve and a constant outlet empty the spring at 2e6 Pa/s at most; more of dA/dt drives it there"
     return (
         "what is left lies around the axle's frequency, where no suspension can act: see the limit"
         if base == "default"
@@ -94,7 +97,8 @@ def _limit_claim(settings: ThesisSettings, best: HalfOutcome) -> Claim:
         "-",
         "at the axle's frequency the body's acceleration does not depend on the suspension",
         "-",
-        f"{density:.3f} (m/s2)2/Hz at {frequency:.2f} Hz; 4 Hz of it are {share:.2f} of two_valve's {best.heave_rms:.2f} m/s2",
+        f"{density:.3f} (m/s2)2/Hz at {frequency:.2f} Hz; 4 Hz of that level make {share:.2f} m/s2 (two_valve: "
+        f"{best.heave_rms:.2f})",
         True,
         "m_s z_s'' = k_t z_r there: only tyre, axle mass or axle damping to the ground could change it",
     )

@@ -110,11 +110,14 @@ def _civic_table() -> Table:
     civic, rig = read_car("table_3_3_honda_civic.csv"), read_car("table_3_4_half_car.csv")
     half = civic["curb_weight"][0] / 2.0
     rows = [
-        _row("body of the half car, kg", HONDA_CIVIC.down(half, "mass"), rig["sprung_mass"][0], "half the curb weight / 12"),
+        _row("body of the half car, kg", HONDA_CIVIC.down(half, "mass"), rig["sprung_mass"][0], "half the curb "
+        "weight / 12"),
         _row("wheelbase, m", HONDA_CIVIC.down(civic["wheelbase"][0], "length"), rig["wheelbase"][0], "/ 5"),
         _row("width, m", HONDA_CIVIC.down(civic["width"][0], "length"), rig["width"][0], "/ 5"),
-        _row("front spring, lb/in", HONDA_CIVIC.down(civic["front_spring_stiffness"][0], "stiffness") / LB_PER_IN, 70.0, "/ 12"),
-        _row("rear spring, lb/in", HONDA_CIVIC.down(civic["rear_spring_stiffness"][0], "stiffness") / LB_PER_IN, 70.0, "/ 12"),
+        _row("front spring, lb/in", HONDA_CIVIC.down(civic["front_spring_stiffness"][0], "stiffness") / LB_PER_IN,
+            70.0, "/ 12"),
+        _row("rear spring, lb/in", HONDA_CIVIC.down(civic["rear_spring_stiffness"][0], "stiffness") / LB_PER_IN,
+            70.0, "/ 12"),
     ]  # fmt: skip
     return Table("Tables 3.3 and 3.4: the Civic brought down", ["quantity", "scaled", "printed", "how"], rows)
 

@@ -28,7 +28,8 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
         _nature_claim(broken["half car"]),
     ]
     lead = (
-        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the inlets open "
+        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the "
+        "inlets open "
         "to three times trim; differences are in standard deviations of each state."
     )
     return Chapter(4, "Nonlinear model of pneumatic suspensions", lead, claims, tables)
@@ -87,6 +88,7 @@ def _nature_claim(broken: dict[str, float]) -> Claim:
         "sufficient",
         f"differ by {gravity:.0f} std with gravity as it is, {air:.1f} std with the atmosphere as it is",
         False,
-        "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = 5 and "
+        "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = "
+        "5 and "
         "the atmosphere with C_P = 2.4 (errata 18)",
     )

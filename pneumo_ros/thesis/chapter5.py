@@ -122,9 +122,11 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
     step("sensitivity to area, amplitude and process")
     sensitivity, sensitivity_claims, more = _sensitivity(settings)
     lead = (
-        "A payload on a sealed air spring on a shaker, simulated by Eq. 5.8 with the effective area of Table 5.2 (linear "
+        "A payload on a sealed air spring on a shaker, simulated by Eq. 5.8 with the effective area of Table 5.2 "
+        "(linear "
         "look-up) and the volume of Table 4.1; base motion "
-        f"{settings.bench_amplitude_in:g} in, c = {settings.bench_damping:g} N s/m. Nothing is fitted to Tables 5.4, 5.5."
+        f"{settings.bench_amplitude_in:g} in, c = {settings.bench_damping:g} N s/m. Nothing is fitted to Tables "
+        f"5.4, 5.5."
     )
     return Chapter(
         5,

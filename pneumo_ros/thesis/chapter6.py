@@ -24,8 +24,10 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
     half_claims, half_tables, half_pictures = chapter6_half.build_half(settings, step)
     lead = (
         f"Class {settings.iso_class} at {settings.speed_kmh:g} km/h, {settings.low_hz:g} to {settings.high_hz:g} Hz, "
-        f"{settings.seeds} roads; rms after {settings.settle:g} s, times 5 for full scale. The quarter car's mass, outlet and "
-        "start height and the road's band are not in the thesis (errata 17): claims are judged as orderings and ratios, "
+        f"{settings.seeds} roads; rms after {settings.settle:g} s, times 5 for full scale. The quarter car's mass, "
+        f"outlet and "
+        "start height and the road's band are not in the thesis (errata 17): claims are judged as orderings and "
+        "ratios, "
         "and a claim that fails says why."
     )
     return Chapter(

@@ -1,4 +1,4 @@
-"""Section 6.7: the half car under first order SMFLC with estimator, exact as in the thesis and with the rig's sensors."""
+"""Section 6.7: the half car under first order SMFLC with estimator, exact as in the thesis and with real sensors."""
 
 from __future__ import annotations
 
@@ -55,16 +55,19 @@ def claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:
         Claim("half-comfort", "6.7.5, Figure 6.26", "the SMFLC with estimator offers a very good ride (MPR near 5)",
               "very good", f"{thesis.rides[0].full_scale_heave_rms / 9.81:.2f} g full scale, MPR {thesis.rating:.1f}; "
               f"{lowest:.0f} % below passive on the worst road", thesis.rating > 4.0,
-              "a class D road at 80 km/h gives 0.9 g passive at full scale: a 2M2A at 1.8 in is a stiff spring (3.5 Hz), and "
+              "a class D road at 80 km/h gives 0.9 g passive at full scale: a 2M2A at 1.8 in is a stiff spring (3.5 "
+              "Hz), and "
               "MPR ends at 0.14 g; relative to passive the ride is good"),
         Claim("half-default", "6.7.5", "with real sensors and the default gains the ride is far better than passive",
               "-", f"at least {least:.0f} % lower heave rms, road by road", least >= 45.0,
               "K_s 5000 in/s3 and a floor of 1 in2 on the area, see pneumo_ros.control.half_car"),
         Claim("half-rear-tyre", "6.7.5, Figure 6.27", "the rear tyre carries more", "rear > front",
-              f"{thesis.tyre_mean[0]:.0f} N and {thesis.tyre_mean[1]:.0f} N", thesis.tyre_mean[1] > thesis.tyre_mean[0]),
+              f"{thesis.tyre_mean[0]:.0f} N and {thesis.tyre_mean[1]:.0f} N",
+              thesis.tyre_mean[1] > thesis.tyre_mean[0]),
         Claim("half-rear-valve", "6.7.5, Figure 6.28", "the rear valve opens more than the front", "rear > front",
               f"rms {front:.4f} and {rear:.4f} in2", rear > front,
-              "at trim and with the default gains the rear opens more; with the printed K_s the front one hits its limit"
+              "at trim and with the default gains the rear opens more; with the printed K_s the front one hits its "
+              "limit"
               if rear <= front else ""),
         Claim("half-valve", "6.7.5, Figure 6.28", "0.025 in2 valves do not saturate", "no saturation",
               f"fully open {100 * thesis.saturated:.1f} % of the time (default gains: {100 * tuned.saturated:.2f} %)",
@@ -89,13 +92,16 @@ def table(title: str, o: Mapping[str, HalfOutcome]) -> Table:
               "1972 limit, h", "Janeway, x limit", "Healey", "tyre load variation", "travel, in", "area error, in2",
               "inlet rms front | rear, in2"]  # fmt: skip
     rows = [
-        [name, f"{x.heave_rms:.3f}", f"{min(r.heave_rms for r in x.rides):.2f} to {max(r.heave_rms for r in x.rides):.2f}",
-         f"{x.pitch_rms:.2f}", f"{x.heave_rms * 5 / 9.81:.3f}", f"{x.rating:.1f}", f"{x.weighted:.2f}", f"{x.hours:.2f}",
+        [name, f"{x.heave_rms:.3f}", f"{min(r.heave_rms for r in x.rides):.2f} to "
+        f"{max(r.heave_rms for r in x.rides):.2f}",
+         f"{x.pitch_rms:.2f}", f"{x.heave_rms * 5 / 9.81:.3f}", f"{x.rating:.1f}", f"{x.weighted:.2f}",
+         f"{x.hours:.2f}",
          f"{x.janeway:.1f}", x.healey, f"{x.tyre_variation:.3f}", f"{x.workspace_in:.2f}", f"{x.area_error_in2:.3f}",
          f"{x.inlet_rms_in2[0]:.4f} | {x.inlet_rms_in2[1]:.4f}"]
         for name, x in o.items()
     ]  # fmt: skip
-    note = "accelerations of the rig; full scale = rig x 5; 1972 limit: longest exposure within fatigue-decreased proficiency"
+    note = "accelerations of the rig; full scale = rig x 5; 1972 limit: longest exposure within fatigue-decreased "
+    "proficiency"
     return Table(title, header, rows, note)
 
 
