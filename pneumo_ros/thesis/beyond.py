@@ -10,7 +10,7 @@ from pneumo_ros.road import iso_psd
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, nominal
-from pneumo_ros.thesis.report import Chapter, Claim, Step
+from pneumo_ros.thesis.report import Chapter, Claim, Step, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import KMH
 
@@ -92,13 +92,12 @@ def invariant_density(settings: ThesisSettings) -> tuple[float, float]:
 def _limit_claim(settings: ThesisSettings, best: HalfOutcome) -> Claim:
     frequency, density = invariant_density(settings)
     share = np.sqrt(4.0 * density)
-    return Claim(
+    return verdict(
         "invariant-point",
-        "-",
-        "at the axle's frequency the body's acceleration does not depend on the suspension",
-        "-",
-        f"{density:.3f} (m/s2)2/Hz at {frequency:.2f} Hz; 4 Hz of that level make {share:.2f} m/s2 (two_valve: "
-        f"{best.heave_rms:.2f})",
+        (
+            f"{density:.3f} (m/s2)2/Hz at {frequency:.2f} Hz; 4 Hz of that level make {share:.2f} m/s2 (two_valve: "
+            f"{best.heave_rms:.2f})"
+        ),
         True,
         "m_s z_s'' = k_t z_r there: only tyre, axle mass or axle damping to the ground could change it",
     )

@@ -9,7 +9,7 @@ from pneumo_ros.road import LENGTH_SCALE
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import CONVENTIONAL, HalfExperiment, heave_of, measure
-from pneumo_ros.thesis.report import Chapter, Claim, Picture, Step, canvas
+from pneumo_ros.thesis.report import Chapter, Picture, Step, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 
 STEPS = 2
@@ -30,16 +30,22 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
     jerk = iso_1972_limit(2.0) * 2.0 / (iso_1972_limit(1.0) * 1.0)
     speed = iso_1972_limit(32.0) / 32.0 / (iso_1972_limit(16.0) / 16.0)
     claims = [
-        Claim("skyhook", "2.5.3", "semi-active skyhook damping improves the ride of a conventional suspension",
-        "better",
-              f"heave rms {passive.heave_rms:.3f} -> {sky.heave_rms:.3f} m/s2", sky.heave_rms < passive.heave_rms,
-              "springs of Table 3.3 scaled; dampers of ratio 0.25, controllable from 0.05 to 1, sky damper 0.7"),
-        Claim("iso-velocity", "2.2.4", "above 8 Hz the 1972 limits are constant velocity", "constant velocity",
-              f"a/f changes by {100 * (speed - 1):.0f} % from 16 to 32 Hz", bool(abs(speed - 1.0) < 0.01)),
-        Claim("iso-jerk", "2.2.4", "below 4 Hz the 1972 limits are constant jerk, as Janeway's", "constant jerk",
-              f"a f grows by a factor {jerk:.2f} from 1 to 2 Hz", bool(abs(jerk - 1.0) < 0.01),
-              "the limit falls with sqrt(f), not with f: neither jerk nor acceleration is constant"),
-    ]  # fmt: skip
+        verdict(
+            "skyhook",
+            f"heave rms {passive.heave_rms:.3f} -> {sky.heave_rms:.3f} m/s2",
+            sky.heave_rms < passive.heave_rms,
+            "springs of Table 3.3 scaled; dampers of ratio 0.25, controllable from 0.05 to 1, sky damper 0.7",
+        ),
+        verdict(
+            "iso-velocity", f"a/f changes by {100 * (speed - 1):.0f} % from 16 to 32 Hz", bool(abs(speed - 1.0) < 0.01)
+        ),
+        verdict(
+            "iso-jerk",
+            f"a f grows by a factor {jerk:.2f} from 1 to 2 Hz",
+            bool(abs(jerk - 1.0) < 0.01),
+            "the limit falls with sqrt(f), not with f: neither jerk nor acceleration is constant",
+        ),
+    ]
     lead = (
         "The half car over the same roads on its own springs and dampers, with skyhook dampers, on passive air "
         "springs, and "

@@ -7,7 +7,7 @@ from scipy.signal import welch
 
 from pneumo_ros.road import ISO_MEAN, LENGTH_SCALE, iso_psd, make_road
 from pneumo_ros.thesis import chapter6_half, chapter6_quarter
-from pneumo_ros.thesis.report import Chapter, Claim, Picture, Step, canvas
+from pneumo_ros.thesis.report import Chapter, Claim, Picture, Step, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import KMH
 
@@ -61,11 +61,8 @@ def _roads(settings: ThesisSettings) -> tuple[Claim, Picture]:
         axes[0].loglog(frequency, iso_psd(frequency, iso_class, settings.speed_kmh * KMH), "k--", lw=0.5)
     axes[0].set(xlabel="Hz", ylabel="full-scale PSD, m2/Hz")
     axes[0].legend(ncols=4, fontsize=7)
-    claim = Claim(
+    claim = verdict(
         "road-psd",
-        "6.2, Eqs. 6.1-6.6",
-        "roads A to H have the spectrum of Eq. 6.1",
-        "Eq. 6.1",
         f"within {worst:.2f} dB over the band (Welch)",
         worst < 1.0,
         "G is per cycle while Omega_0 is in rad/m; H continues the factor of 4 between classes",

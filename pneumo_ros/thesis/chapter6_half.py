@@ -8,7 +8,7 @@ from pneumo_ros.parameters import Value
 from pneumo_ros.plant.half_car import PITCH
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, run
-from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas
+from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import DEGREE, INCH, SQUARE_INCH
 
@@ -24,12 +24,10 @@ def experiments(settings: ThesisSettings) -> dict[str, HalfExperiment]:
     return {
         "passive": HalfExperiment("passive"),
         "thesis, exact": HalfExperiment("thesis", exact, VOLUME, True, HEIGHT_ERROR_IN),
-        "thesis, payload": HalfExperiment(
-            "thesis", {**exact, **TWICE}, {**VOLUME, **TWICE}, True, HEIGHT_ERROR_IN
-        ),
+        "thesis, payload": HalfExperiment("thesis", {**exact, **TWICE}, {**VOLUME, **TWICE}, True, HEIGHT_ERROR_IN),
         "thesis, sensors": HalfExperiment("thesis", {}, VOLUME, False, HEIGHT_ERROR_IN),
         "default, sensors": HalfExperiment("default", {}, VOLUME, False, HEIGHT_ERROR_IN),
-    }  # fmt: skip
+    }
 
 
 def build_half(settings: ThesisSettings, step: Step) -> tuple[list[Claim], list[Table], list[Picture]]:
@@ -52,54 +50,99 @@ def claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:
     tuned = o["default, sensors"]
     least = 100 * (1 - max(a.heave_rms / b.heave_rms for a, b in zip(tuned.rides, passive.rides, strict=True)))
     return [
-        Claim("half-comfort", "6.7.5, Figure 6.26", "the SMFLC with estimator offers a very good ride (MPR near 5)",
-              "very good", f"{thesis.rides[0].full_scale_heave_rms / 9.81:.2f} g full scale, MPR {thesis.rating:.1f}; "
-              f"{lowest:.0f} % below passive on the worst road", thesis.rating > 4.0,
-              "a class D road at 80 km/h gives 0.9 g passive at full scale: a 2M2A at 1.8 in is a stiff spring (3.5 "
-              "Hz), and "
-              "MPR ends at 0.14 g; relative to passive the ride is good"),
-        Claim("half-default", "6.7.5", "with real sensors and the default gains the ride is far better than passive",
-              "-", f"at least {least:.0f} % lower heave rms, road by road", least >= 45.0,
-              "K_s 5000 in/s3 and a floor of 1 in2 on the area, see pneumo_ros.control.half_car"),
-        Claim("half-rear-tyre", "6.7.5, Figure 6.27", "the rear tyre carries more", "rear > front",
-              f"{thesis.tyre_mean[0]:.0f} N and {thesis.tyre_mean[1]:.0f} N",
-              thesis.tyre_mean[1] > thesis.tyre_mean[0]),
-        Claim("half-rear-valve", "6.7.5, Figure 6.28", "the rear valve opens more than the front", "rear > front",
-              f"rms {front:.4f} and {rear:.4f} in2", rear > front,
-              "at trim and with the default gains the rear opens more; with the printed K_s the front one hits its "
-              "limit"
-              if rear <= front else ""),
-        Claim("half-valve", "6.7.5, Figure 6.28", "0.025 in2 valves do not saturate", "no saturation",
-              f"fully open {100 * thesis.saturated:.1f} % of the time (default gains: {100 * tuned.saturated:.2f} %)",
-              thesis.saturated < 0.001),
-        Claim("half-estimator", "6.7.5, Figure 6.29", "the estimator finds both areas (rms after 1 s)", "very small",
-              f"{thesis.area_error_in2:.3f} in2 exact, {tuned.area_error_in2:.3f} in2 with the rig's sensors",
-              thesis.area_error_in2 < 0.05),
-        Claim("half-payload", "6.7.5, Figure 6.30", "designed at twice the mass, heave rms is almost the same",
-              "almost the same", f"{100 * change:+.1f} %", abs(change) < 0.05),
-        Claim("half-payload-tyre", "6.7.5, Figure 6.31", "tyre load variation is almost the same", "almost the same",
-              f"{100 * tyres:+.1f} %", abs(tyres) < 0.05),
-        Claim("half-payload-inlet", "6.7.5, Figure 6.32", "the inlet openings grow under payload uncertainty", "grow",
-              f"front {100 * (heavy[0] / front - 1):+.0f} %, rear {100 * (heavy[1] / rear - 1):+.0f} %",
-              heavy[0] > front and heavy[1] > rear,
-              "believed mass and area grow together and cancel (Eq. 6.57); a car that is really heavier needs more"),
-    ]  # fmt: skip
+        verdict(
+            "half-comfort",
+            (
+                f"{thesis.rides[0].full_scale_heave_rms / 9.81:.2f} g full scale, MPR {thesis.rating:.1f}; "
+                f"{lowest:.0f} % below passive on the worst road"
+            ),
+            thesis.rating > 4.0,
+            (
+                "a class D road at 80 km/h gives 0.9 g passive at full scale: a 2M2A at 1.8 in is a stiff spring (3.5 "
+                "Hz), and "
+                "MPR ends at 0.14 g; relative to passive the ride is good"
+            ),
+        ),
+        verdict(
+            "half-default",
+            f"at least {least:.0f} % lower heave rms, road by road",
+            least >= 45.0,
+            "K_s 5000 in/s3 and a floor of 1 in2 on the area, see pneumo_ros.control.half_car",
+        ),
+        verdict(
+            "half-rear-tyre",
+            f"{thesis.tyre_mean[0]:.0f} N and {thesis.tyre_mean[1]:.0f} N",
+            thesis.tyre_mean[1] > thesis.tyre_mean[0],
+        ),
+        verdict(
+            "half-rear-valve",
+            f"rms {front:.4f} and {rear:.4f} in2",
+            rear > front,
+            (
+                "at trim and with the default gains the rear opens more; with the printed K_s the front one hits its "
+                "limit"
+                if rear <= front
+                else ""
+            ),
+        ),
+        verdict(
+            "half-valve",
+            f"fully open {100 * thesis.saturated:.1f} % of the time (default gains: {100 * tuned.saturated:.2f} %)",
+            thesis.saturated < 0.001,
+        ),
+        verdict(
+            "half-estimator",
+            f"{thesis.area_error_in2:.3f} in2 exact, {tuned.area_error_in2:.3f} in2 with the rig's sensors",
+            thesis.area_error_in2 < 0.05,
+        ),
+        verdict("half-payload", f"{100 * change:+.1f} %", abs(change) < 0.05),
+        verdict("half-payload-tyre", f"{100 * tyres:+.1f} %", abs(tyres) < 0.05),
+        verdict(
+            "half-payload-inlet",
+            f"front {100 * (heavy[0] / front - 1):+.0f} %, rear {100 * (heavy[1] / rear - 1):+.0f} %",
+            heavy[0] > front and heavy[1] > rear,
+            "believed mass and area grow together and cancel (Eq. 6.57); a car that is really heavier needs more",
+        ),
+    ]
 
 
 def table(title: str, o: Mapping[str, HalfOutcome]) -> Table:
     """Ride, tyres, travel and valves of half-car runs."""
-    header = ["run", "heave rms, m/s2", "per road", "pitch rms, rad/s2", "full scale, g", "MPR", "Wk, m/s2",
-              "1972 limit, h", "Janeway, x limit", "Healey", "tyre load variation", "travel, in", "area error, in2",
-              "inlet rms front | rear, in2"]  # fmt: skip
+    header = [
+        "run",
+        "heave rms, m/s2",
+        "per road",
+        "pitch rms, rad/s2",
+        "full scale, g",
+        "MPR",
+        "Wk, m/s2",
+        "1972 limit, h",
+        "Janeway, x limit",
+        "Healey",
+        "tyre load variation",
+        "travel, in",
+        "area error, in2",
+        "inlet rms front | rear, in2",
+    ]
     rows = [
-        [name, f"{x.heave_rms:.3f}", f"{min(r.heave_rms for r in x.rides):.2f} to "
-        f"{max(r.heave_rms for r in x.rides):.2f}",
-         f"{x.pitch_rms:.2f}", f"{x.heave_rms * 5 / 9.81:.3f}", f"{x.rating:.1f}", f"{x.weighted:.2f}",
-         f"{x.hours:.2f}",
-         f"{x.janeway:.1f}", x.healey, f"{x.tyre_variation:.3f}", f"{x.workspace_in:.2f}", f"{x.area_error_in2:.3f}",
-         f"{x.inlet_rms_in2[0]:.4f} | {x.inlet_rms_in2[1]:.4f}"]
+        [
+            name,
+            f"{x.heave_rms:.3f}",
+            f"{min(r.heave_rms for r in x.rides):.2f} to {max(r.heave_rms for r in x.rides):.2f}",
+            f"{x.pitch_rms:.2f}",
+            f"{x.heave_rms * 5 / 9.81:.3f}",
+            f"{x.rating:.1f}",
+            f"{x.weighted:.2f}",
+            f"{x.hours:.2f}",
+            f"{x.janeway:.1f}",
+            x.healey,
+            f"{x.tyre_variation:.3f}",
+            f"{x.workspace_in:.2f}",
+            f"{x.area_error_in2:.3f}",
+            f"{x.inlet_rms_in2[0]:.4f} | {x.inlet_rms_in2[1]:.4f}",
+        ]
         for name, x in o.items()
-    ]  # fmt: skip
+    ]
     note = "accelerations of the rig; full scale = rig x 5; 1972 limit: longest exposure within fatigue-decreased "
     "proficiency"
     return Table(title, header, rows, note)
