@@ -118,7 +118,7 @@ def test_core_inverts_the_plant(car_and_trim: tuple[HalfCar, Trim]) -> None:
     height, rate = x[0] + car.body.front_arm * x[1] - x[2], x[4] + car.body.front_arm * x[5] - x[6]
     area = effective_area(height, x[8] - 101325.0, car.surface)
     volume = car.front.volume_offset + car.front.mean_area * height
-    spring = Spring(x[8], height, rate, 0.0, area, volume)
+    spring = Spring(x[8], height, rate, 0.0, area, volume, car.front.mean_area)
     for wanted in (400.0, 0.0, -150.0):
         for two_valve in (0.0, 1.0):
             inlet, outlet = openings(

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from pneumo_ros.session.repair import Recovery
     from pneumo_ros.session.salvage import Salvaged
 
-app = typer.Typer(help="Look into a session log, check, repair, export and compare.", no_args_is_help=True)
+app = typer.Typer(
+    add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
+)
 console = Console()
 
 LogPath = Annotated[Path, typer.Argument(help="Session log (.mcap) or a folder as `ros2 bag record` writes it.")]
@@ -151,13 +153,23 @@ def _show_settings(report: Report) -> None:
         table.add_row("rig", key, f"{ours:g} (nominal {nominal:g})")
     for name, entries in report.metadata:
         for key, value in entries.items():
-            table.add_row(name, key, value if len(value) < 200 and "\n" not in value else f"({len(value)} characters)")
+            table.add_row(name, key, _short(value) if "\n" not in value else f"({len(value)} characters)")
+    before: dict[str, dict[str, object]] = {}
     for setup in report.setups:
-        for key, given in setup.parameters.items():
-            table.add_row(f"{setup.node} at {setup.time_ns / 1e9:.3f} s", str(key), str(given)[:200])
+        known = before.setdefault(setup.node, {})
+        new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
+        word = "changed" if known.keys() & new.keys() else "parameters"
+        known.update(new)
+        shown = ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != "")
+        table.add_row(f"{setup.node}, {setup.time_ns / 1e9:.3f} s", word, shown)
     for name, size in report.attachments:
         table.add_row("attachment", name, f"{size} bytes")
     console.print(table)
+
+
+def _short(value: object, limit: int = 120) -> str:
+    text = str(value)
+    return text if len(text) <= limit else f"{text[:limit]}... ({len(text)} characters)"
 
 
 def _show_events(report: Report) -> None:

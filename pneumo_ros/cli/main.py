@@ -17,8 +17,8 @@ from pneumo_ros.errors import PneumoError
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
-    "log": "Inspect, check, recover, export and compare logs.",
-    "view": "See a log in the browser.",
+    "log": "Look into a session log: info, validate, recover, export, compare.",
+    "view": "Show a session in the browser: a log played back, or a running session.",
 }
 
 

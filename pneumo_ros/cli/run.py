@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+from contextlib import nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -41,22 +42,30 @@ def run(
     domain_id: Annotated[
         int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
+    ] = False,
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
+    from pneumo_ros.cli.view import beside
     from pneumo_ros.session.plan import assign, parse_setting, read_config
 
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
-    options = _options(road, duration, speed, controller, seed, rate, realtime)
+    options = _options(road, duration, speed, controller, seed, rate, realtime or view)
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
     target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
     _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": "sim"})
     _check(values, target)
     console = Console()
-    _run_session(console, values, target, single_process, domain_id)
-    _report(console, target, values, picture)
+    with beside(domain_id) if view else nullcontext() as dashboard:
+        _run_session(console, values, target, single_process, domain_id)
+        _report(console, target, values, picture)
+        if dashboard is not None:
+            console.print("the dashboard stays until Ctrl-C")
+            dashboard.wait()
 
 
 def node_tables() -> Tables:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.control.laws.common import Error, Gains
 from pneumo_ros.control.laws.family import FLC, LAWS, wanted_jerk
-from pneumo_ros.control.linearisation import Compensation, Spring, force_rates, openings
+from pneumo_ros.control.linearisation import Compensation, Spring, believed_volume, force_rates, openings
 from pneumo_ros.control.reference_model import advance_reference, reference_jerk
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, load_surface
@@ -50,6 +50,9 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         "pole", 10.0, "1/s", "lambda: triple pole of the error's dynamics and of the sliding surface", 0.5, 200.0
     ),
+    Parameter(
+        "follow_axles", False, "", "reference model leads to design height above the axles, not to a fixed height"
+    ),
     Parameter("reference_pole", 10.0, "1/s", "triple pole of the reference model", 0.5, 200.0),
     Parameter("sliding_heave_in_s3", 5000.0, "in/s^3", "K_s of heave (Section 6.7.5 has 20000)", 0.0, 1e6),
     Parameter("sliding_pitch_rad_s3", 100.0, "rad/s^3", "K_s of pitch", 0.0, 1e6),
@@ -69,6 +72,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
         "mass_scale", 1.0, "1", "believed over true sprung mass and inertia (payload uncertainty, Eq. 6.57)", 0.1, 5.0
     ),
+    Parameter("area_rate_share", 0.6, "1", "share of dA/dt fed forward by the variants that do", 0.0, 1.5),
     Parameter("bushing_feedforward", False, "", "compensate the bushing damping's force rate"),
     Parameter(
         "area_floor_in2",
@@ -104,6 +108,8 @@ class Law(NamedTuple):
     area_floor: float
     height_error: float
     compensation: Compensation
+    follow_axles: bool
+    design_height: float
     period: float
 
 
@@ -188,7 +194,9 @@ def _law(rig: Rig, at_rest: Trim, name: str, v: dict[str, Value], period: float)
         constant_area=float(v["constant_area_in2"]) * SQUARE_INCH,
         area_floor=float(v["area_floor_in2"]) * SQUARE_INCH,
         height_error=float(v["height_error_in"]) * INCH,
-        compensation=Compensation(float(area_rate), damping, float(two_valve)),
+        compensation=Compensation(float(v["area_rate_share"]) * area_rate, damping, float(two_valve)),
+        follow_axles=bool(v["follow_axles"]),
+        design_height=rig.design_height.value,
         period=period,
     )
 
@@ -202,9 +210,21 @@ def _clip(value: float, high: float) -> float:
 def believed_spring(x: NDArray[np.float64], side: int, law: Law, gas: Gas) -> Spring:
     """The spring of one side (0 front, 1 rear) as the controller believes it, with its uncertainties."""
     height = x[6 + side] + law.height_error
-    volume = law.volume_estimate if law.volume_estimate > 0.0 else gas.volume_offset + gas.mean_area * height
+    volume, mean_area = believed_volume(height, law.volume_estimate, gas)
     area = law.constant_area if law.constant_area > 0.0 else max(x[14 + side], law.area_floor)
-    return Spring(x[12 + side], height, x[8 + side], x[10 + side], area, volume)
+    return Spring(x[12 + side], height, x[8 + side], x[10 + side], area, volume, mean_area)
+
+
+@njit(cache=True, error_model="numpy")
+def wanted_position(x: NDArray[np.float64], output: int, law: Law) -> float:
+    """Target of the reference model: heave (0), m, or pitch (1), rad; fixed, or design height above the axles."""
+    if not law.follow_axles:
+        return law.target_heave if output == 0 else law.target_pitch
+    wheelbase = law.front_arm + law.rear_arm
+    front, rear = law.design_height - x[6], law.design_height - x[7]
+    if output == 0:
+        return x[0] + (law.rear_arm * front + law.front_arm * rear) / wheelbase
+    return x[1] + (front - rear) / wheelbase
 
 
 @njit(cache=True, error_model="numpy")
@@ -214,7 +234,8 @@ def control_half_car(
     """One step: state (8,), estimate (16,) -> new state, command (4,), telemetry (4,)."""
     new, jerk, telemetry = np.empty(8), np.empty(2), np.empty(4)
     for i in range(2):
-        gains, target = (law.heave, law.target_heave) if i == 0 else (law.pitch, law.target_pitch)
+        gains = law.heave if i == 0 else law.pitch
+        target = wanted_position(x, i, law)
         reference = (state[3 * i], state[3 * i + 1], state[3 * i + 2])
         if law.law == FLC:
             reference = (target, 0.0, 0.0)

@@ -16,6 +16,7 @@ from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, inlet_
 from pneumo_ros.units import GAS_CONSTANT
 
 SMALLEST_AREA = 1e-5  # m2 (0.016 in2): below it force does not answer to pressure and dividing by it asks for anything
+SMALLEST_HEIGHT = 5e-3  # m
 HEIGHT_STEP, GAUGE_STEP = 1e-5, 100.0  # m and Pa, for the slopes of the area surface
 
 
@@ -28,6 +29,7 @@ class Spring(NamedTuple):
     height, height_rate, height_acceleration : m, m/s, m/s2
     area : effective area, m2
     volume : m3
+    mean_area : dV/dh, m2 (Eq. 4.26)
     """
 
     pressure: float
@@ -36,6 +38,7 @@ class Spring(NamedTuple):
     height_acceleration: float
     area: float
     volume: float
+    mean_area: float
 
 
 class Compensation(NamedTuple):
@@ -51,6 +54,14 @@ class Compensation(NamedTuple):
     area_rate: float
     bushing: float
     two_valve: float
+
+
+@njit(cache=True)
+def believed_volume(height: float, estimate: float, gas: Gas) -> tuple[float, float]:
+    """Volume, m3, and dV/dh, m2: the spring's own, or a constant ``estimate`` > 0 whose mean area is V/h (Eq. 4.26)."""
+    if estimate > 0.0:
+        return estimate, estimate / max(height, SMALLEST_HEIGHT)
+    return gas.volume_offset + gas.mean_area * height, gas.mean_area
 
 
 @njit(cache=True)
@@ -86,7 +97,7 @@ def wanted_net_flow(pressure_rate: float, spring: Spring, power: float, gas: Gas
 
     ``power`` is T2/T1 (Eq. 4.17).
     """
-    stored = spring.volume * pressure_rate / gas.exponent + spring.pressure * gas.mean_area * spring.height_rate
+    stored = spring.volume * pressure_rate / gas.exponent + spring.pressure * spring.mean_area * spring.height_rate
     return stored / (GAS_CONSTANT * gas.supply_temperature * power)
 
 

@@ -6,6 +6,7 @@ command holds from this sample (or ``delay`` periods later) to the next.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,7 @@ def close_loop(
     seed: int = 0,
     delay: int = 0,
     exact: bool = False,
+    offsets: Sequence[float] = (0.0,) * 6,
 ) -> Run:
     """Run a closed loop from rest at the controller's trim.
 
@@ -61,18 +63,20 @@ def close_loop(
     seed : of the sensor noise
     delay : whole periods between sample and valve
     exact : True gives estimator and controller the true rates and accelerations, as the thesis's simulations do
+    offsets : of the six sensors, m and Pa
     """
     road = np.ascontiguousarray(road, dtype=float)
     count, period = len(road) - 1, controller.law.period
     noise = np.random.default_rng(seed).standard_normal((count, 6))
     noise *= [rig.displacement_noise.value] * 4 + [rig.pressure_noise.value] * 2
     start = controller.at_rest.state
+    noise += np.asarray(offsets, dtype=float)
     first = measure(start, car.body) + noise[0]
     initial = estimator.init(first)
     results = _close(
         start, road, noise, delay, exact, period, substeps(period, car.step),
         car.body, car.front, car.rear, car.surface,
-        *initial, estimator.gains, estimator.model,
+        *initial, estimator.gains, estimator.model, estimator.surface,
         controller.name == "passive", controller.init(), controller.at_rest.command,
         controller.law, controller.front, controller.rear, controller.surface,
     )  # fmt: skip
@@ -131,6 +135,7 @@ def _close(
     gain: NDArray[np.float64],
     gains: NDArray[np.float64],
     model: Model,
+    estimator_surface: AreaSurface,
     passive: bool,
     control: NDArray[np.float64],
     trim_command: NDArray[np.float64],
@@ -148,12 +153,12 @@ def _close(
         before = (areas, gain)
         measurements[i] = measure(states[i], body) + noise[i]
         derivatives, areas, gain, estimates[i] = estimate_half_car(
-            derivatives, areas, gain, measurements[i], gains, model
+            derivatives, areas, gain, measurements[i], gains, model, estimator_surface
         )
         if exact:
             command = applied[i - 1] if i > 0 else trim_command
             exact_kinematics(states[i], command, road[i], body, front, rear, surface, estimates[i])
-            areas, gain = estimate_areas(estimates[i], before[0], before[1], model)
+            areas, gain = estimate_areas(estimates[i], before[0], before[1], model, estimator_surface)
         if passive:
             computed[i] = trim_command
         else:

@@ -169,7 +169,9 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
         stamps, logged = columns.stamp_ns, columns.log_time_ns
     else:
         stamps = logged = log.records(name).log_time_ns
-    timing = measure_timing(stamps, logged, log.records(name).disordered) if len(stamps) >= _PERIODIC else None
+    # Events and health come from several nodes at once: their stamps say nothing about a rate.
+    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY
+    timing = measure_timing(stamps, logged, log.records(name).disordered) if periodic else None
     first, last = (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
     return TopicReport(name, info.type, info.count, first, last, info.qos, timing)
 

@@ -151,6 +151,10 @@ DIAGNOSTIC = Topic(
     "/diagnostics", DIAGNOSTICS, "health at 1 Hz (REP 107): period and execution time p50, p99, max, missed ticks",
     "", flow=Flow.STATUS,
 )  # fmt: skip
+ESTOP = Topic(
+    "/rig/estop", "std_msgs/msg/Bool", "emergency stop: true latches it, false does nothing; released by service only",
+    "", ("plant",), flow=Flow.EVENTS,
+)  # fmt: skip
 READY = Topic(
     "/rig/ready", STRING, "name of a node whose publishers have all their subscribers", "", ("plant",),
     flow=Flow.EVENTS, recorded=False,
@@ -158,7 +162,7 @@ READY = Topic(
 
 TOPICS: tuple[Topic, ...] = (
     ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
-    EVENTS, DIAGNOSTIC, READY,
+    EVENTS, DIAGNOSTIC, ESTOP, READY,
 )  # fmt: skip
 MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
 BY_NAME = {topic.name: topic for topic in TOPICS}
