@@ -42,6 +42,7 @@ class ControllerNode(RigNode):
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode
         self._steps = 0
+        self._last_stamp = 0
         self._refused = 0
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
@@ -57,8 +58,9 @@ class ControllerNode(RigNode):
         start = time.monotonic_ns()
         stamp, values = self._read(data)
         estimate = np.array(values)
-        if self.state is None:
+        if self.state is None or stamp < self._last_stamp:  # a replayed log jumped back: begin again
             self.state = self.controller.init(estimate)
+        self._last_stamp = stamp
         state, command, telemetry = self.controller.step(self.state, estimate)
         if math.isfinite(command.sum()):
             self.state = state
