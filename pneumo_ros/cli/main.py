@@ -17,6 +17,8 @@ from pneumo_ros.errors import PneumoError
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
+    "emulate": "Emulate the rig's board on a pseudo-terminal, with faults on request.",
+    "calibrate": "Make a calibration from measured points, or check one.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
     "view": "Show a session in the browser: a log played back, or a running session.",
