@@ -283,7 +283,7 @@ class DriverCore:
             self._make_safe(finding, now)
         elif now - self._last_complaint >= COMPLAINT_EVERY:
             self._last_complaint = now
-            self._finding_event(finding, now)
+            self._finding_event(finding._replace(level=Level.WARN), now)  # an error once the driver trips over it
 
     def blockers(self, now: int) -> list[str]:
         """Why the valves cannot be armed; empty if they can."""

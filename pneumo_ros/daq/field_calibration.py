@@ -35,7 +35,7 @@ def references(what: str, rig: Rig) -> dict[str, float]:
     if what == "pressure":
         return dict.fromkeys(SENSORS[4:], rig.ambient_pressure.value)
     levelled = read_channels(trim(rig).state, rig.front_arm.value, rig.rear_arm.value)
-    return dict(zip(CHANNELS[:4], levelled[:4], strict=True))
+    return {channel: float(value) for channel, value in zip(CHANNELS[:4], levelled[:4], strict=True)}
 
 
 def zero(calibration: Calibration, readings: Readings, what: str, rig: Rig) -> tuple[Calibration, dict[str, Point]]:

@@ -21,7 +21,6 @@ from pneumo_ros.daq.calibration import DEFAULT
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import Phase
 from pneumo_ros.daq.driver import BAUD, SerialDriver
-from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.daq.reasons import Event, Level
 from pneumo_ros.daq.report import LinkReport
 from pneumo_ros.daq.safety_config import load_safety
@@ -83,7 +82,6 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self._first_ns = 0
         LifecycleNodeMixin.__init__(self)
         self.create_timer(LOOK_PERIOD, self._look)
-        prefer_this_process()
 
     @property
     def state_label(self) -> str:
