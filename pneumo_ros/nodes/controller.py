@@ -12,6 +12,7 @@ from rclpy.context import Context
 
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.half_car import Controller, build_controller
+from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
