@@ -250,6 +250,22 @@ def test_a_killed_driver_leaves_the_valves_to_the_firmware(tmp_path: Path) -> No
     assert any(kind == "state" and text == "safe watchdog" for _, kind, text in truth.events)
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_driver_that_breaks_lets_go_of_the_valves(tmp_path: Path, loop: Loop) -> None:
+    def scenario(folder: Path) -> None:
+        with SerialRig(folder, loop=loop) as rig:
+            armed_until(rig, 0.3)
+            start = time.monotonic_ns()
+            rig.driver._on_measurement = None  # type: ignore[assignment]
+            assert rig.wait(lambda core: core.mode is Mode.SAFE, 2.0)
+            time.sleep(0.1)
+            assert rig.driver.failed
+        check_reaction(rig, start)
+
+    attempt(tmp_path, scenario)
+
+
 def test_one_rig_has_one_driver(tmp_path: Path) -> None:
     with SerialRig(tmp_path) as rig:
         second = SerialRig(tmp_path)

@@ -159,7 +159,11 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         state = self.state_label
         if self.stop.set:
             return
-        if self._start_asked and not self._first_ns:
+        if self.driver is not None and self.driver.failed:
+            trip = self.driver.core.trip
+            print(f"error: {trip.message if trip else 'the driver failed'}", file=sys.stderr, flush=True)
+            self.exit_code, self.stop.failed, self.stop.set = 1, True, True
+        elif self._start_asked and not self._first_ns:
             self._start(state)
         elif state == "active" and self.driver is not None and self.driver.core.mode is not Mode.ARMED:
             self.trigger_deactivate()
