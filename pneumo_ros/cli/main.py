@@ -18,6 +18,7 @@ BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
+    "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
     "view": "Show a session in the browser: a log played back, or a running session.",
 }
 

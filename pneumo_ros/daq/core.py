@@ -199,6 +199,9 @@ class DriverCore:
         measurement, found = self.intake.take(sample, now)
         self._last_sample, self._silent = now, False
         self._follow_board(sample, now)
+        if self.intake.recent_loss > self.safety.plausibility.lost_at_once:
+            text = f"{self.intake.recent_loss:.0%} of the last frames lost"
+            found.append(Finding(Reason.FRAMES_LOST, "link", text))
         for finding in found:
             self._handle(finding, now)
         if measurement is not None:
@@ -290,7 +293,7 @@ class DriverCore:
         if self._silent:
             out.append("the board is silent")
         if not self.intake.clock.settled:
-            out.append("the device clock is not settled yet (1 s)")
+            out.append("the device clock is not settled yet (0.5 s)")
         if not all(self.last.valid):
             out.append("a sensor cannot be believed")
         supply = self.last.values[6]

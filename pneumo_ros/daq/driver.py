@@ -8,6 +8,7 @@ import select
 import termios
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeVar
@@ -28,6 +29,7 @@ BAUD = 921_600
 TICK = 0.002  # s between looks at the timeouts
 REOPEN = 0.1  # s between attempts to open the port
 READ_SIZE = 4096
+LATENESS_KEPT = 5000
 POLL = 0.05  # s the reader waits for bytes before it looks whether to stop
 T = TypeVar("T")
 
@@ -56,6 +58,7 @@ class SerialDriver:
         self.port, self.baud = port, baud
         self.core = DriverCore(safety, calibration, rig, self._write, self._discard)
         self.dropped_writes = 0
+        self.lateness_ns: deque[tuple[int, int]] = deque(maxlen=LATENESS_KEPT)  # (when, how late a look was)
         self._on_measurement, self._on_event = on_measurement, on_event
         self._serial: serial.Serial | None = None
         self._lock = threading.RLock()
@@ -209,8 +212,11 @@ class SerialDriver:
             self._do(partial(self.core.receive, data))
 
     def _supervise(self) -> None:
-        next_open = 0.0
+        next_open, due = 0.0, time.monotonic_ns()
         while not self._stop.wait(TICK):
+            now = time.monotonic_ns()
+            self.lateness_ns.append((now, now - due - round(TICK * 1e9)))
+            due = now
             if self._serial is None and time.monotonic() >= next_open:
                 next_open = time.monotonic() + REOPEN
                 self._try_open()

@@ -19,6 +19,7 @@ WRAP = 1 << 32
 MAX_GAP = 1 << 31  # sequences further ahead than this are behind
 MISFITS = 10  # samples in a row that do not continue the last good one: another board, or it has restarted
 LATENCIES = 2000  # kept for the percentiles
+LOSS_MEMORY = 40  # frames over which the recent loss forgets
 
 
 class Measurement(NamedTuple):
@@ -56,6 +57,7 @@ class Intake:
         self.clock = DeviceClock()
         self.limits = LimitMonitor(safety.limits)
         self.samples = self.lost = self.out_of_step = 0
+        self.recent_loss = 0.0  # share of frames lost, exponentially forgotten
         self.rails: Counter[str] = Counter()
         self.latencies_ns: deque[int] = deque(maxlen=LATENCIES)
         self._last: Sample | None = None
@@ -115,6 +117,8 @@ class Intake:
 
     def _accept(self, sample: Sample, lost: int) -> None:
         self._last, self._misfits = sample, 0
+        kept = (1.0 - 1.0 / LOSS_MEMORY) ** min(lost, LOSS_MEMORY * 10)
+        self.recent_loss = (1.0 - kept * (1.0 - self.recent_loss)) * (1.0 - 1.0 / LOSS_MEMORY)
         self.samples += 1
         self.lost += lost
 

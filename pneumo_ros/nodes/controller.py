@@ -42,6 +42,7 @@ class ControllerNode(RigNode):
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
+        self._last_stamp = 0
         self._refused = 0
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
@@ -56,8 +57,9 @@ class ControllerNode(RigNode):
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, estimate = self._read(data)
-        if self.state is None:
+        if self.state is None or stamp < self._last_stamp:  # a replayed log jumped back: begin again
             self.state = self.controller.init(estimate)
+        self._last_stamp = stamp
         state, command, telemetry = self.controller.step(self.state, estimate)
         if math.isfinite(command[0] + command[1] + command[2] + command[3]):
             self.state = state

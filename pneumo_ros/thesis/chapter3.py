@@ -9,7 +9,7 @@ from pneumo_ros.paths import share_file
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.plant.similitude import HONDA_CIVIC, Powers, representative_pi_numbers
 from pneumo_ros.thesis.chapter5 import read_table
-from pneumo_ros.thesis.report import Chapter, Claim, Step, Table
+from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.thesis.similitude_proof import difference, laws_of
 from pneumo_ros.units import ATMOSPHERE, INCH, POUND_FORCE, PSI, SQUARE_INCH
@@ -68,25 +68,14 @@ def _pi_claim() -> Claim:
         tuple(int(found[name].get(q, Fraction(0))) for q in ("length", "mass", "frequency")) == powers
         for name, powers in PRINTED.items()
     )
-    return Claim(
-        "pi-numbers",
-        "Eqs. 3.31-3.34",
-        "four representative Pi-numbers",
-        "k/(m w2), b/(m w), F/(m w2 l), J/(m l2)",
-        f"{same} of 4 the same",
-        same == 4,
-        "derived by linear algebra",
-    )
+    return verdict("pi-numbers", f"{same} of 4 the same", same == 4, "derived by linear algebra")
 
 
 def _law_claim() -> Claim:
     f = HONDA_CIVIC.factor
     values = {q: f(q) for q in ("mass", "stiffness", "damping", "force")}
-    return Claim(
+    return verdict(
         "scale-factors",
-        "Eqs. 3.48-3.54, 7.1",
-        "mass, stiffness and damping have one scale factor, whatever the length's; force has C_K C_L",
-        "12, 12, 12; 60",
         ", ".join(f"{v:g}" for v in values.values()),
         values["mass"] == values["stiffness"] == values["damping"] and values["force"] == 60.0,
     )
@@ -95,11 +84,8 @@ def _law_claim() -> Claim:
 def _similar_claim() -> Claim:
     kept = max(difference("conventional half car", HONDA_CIVIC))
     broken = {law: difference("conventional half car", HONDA_CIVIC, law)[0] for law in laws_of("conventional half car")}
-    return Claim(
+    return verdict(
         "conventional-similar",
-        "3.4",
-        "equal Pi-numbers make full scale and scaled model one",
-        "similar",
         f"differ by {kept:.0e} std; by {min(broken.values()):.2f} std once a law is broken by 10 %",
         kept < 1e-6 < min(broken.values()),
         "Eqs. 3.33-3.42 as printed mix signs of pitch and swap damping with stiffness numbers; corrected",
@@ -110,11 +96,14 @@ def _civic_table() -> Table:
     civic, rig = read_car("table_3_3_honda_civic.csv"), read_car("table_3_4_half_car.csv")
     half = civic["curb_weight"][0] / 2.0
     rows = [
-        _row("body of the half car, kg", HONDA_CIVIC.down(half, "mass"), rig["sprung_mass"][0], "half the curb weight / 12"),
+        _row("body of the half car, kg", HONDA_CIVIC.down(half, "mass"), rig["sprung_mass"][0], "half the curb "
+        "weight / 12"),
         _row("wheelbase, m", HONDA_CIVIC.down(civic["wheelbase"][0], "length"), rig["wheelbase"][0], "/ 5"),
         _row("width, m", HONDA_CIVIC.down(civic["width"][0], "length"), rig["width"][0], "/ 5"),
-        _row("front spring, lb/in", HONDA_CIVIC.down(civic["front_spring_stiffness"][0], "stiffness") / LB_PER_IN, 70.0, "/ 12"),
-        _row("rear spring, lb/in", HONDA_CIVIC.down(civic["rear_spring_stiffness"][0], "stiffness") / LB_PER_IN, 70.0, "/ 12"),
+        _row("front spring, lb/in", HONDA_CIVIC.down(civic["front_spring_stiffness"][0], "stiffness") / LB_PER_IN,
+            70.0, "/ 12"),
+        _row("rear spring, lb/in", HONDA_CIVIC.down(civic["rear_spring_stiffness"][0], "stiffness") / LB_PER_IN,
+            70.0, "/ 12"),
     ]  # fmt: skip
     return Table("Tables 3.3 and 3.4: the Civic brought down", ["quantity", "scaled", "printed", "how"], rows)
 
@@ -128,15 +117,14 @@ def _civic_claim() -> Claim:
     mass = HONDA_CIVIC.down(civic["curb_weight"][0] / 2.0, "mass")
     length = HONDA_CIVIC.down(civic["wheelbase"][0], "length")
     share = rig["rear_arm"][0] / (rig["front_arm"][0] + rig["rear_arm"][0])
-    return Claim(
+    return verdict(
         "civic",
-        "Tables 3.3, 3.4",
-        "the rig is the Civic's half car scaled",
-        "50.33 kg, 0.508 m, 60/40 front/rear",
         f"{mass:.2f} kg, {length:.3f} m, {100 * share:.0f} % on the front axle",
-        abs(mass / rig["sprung_mass"][0] - 1.0) < 0.01
-        and abs(length / rig["wheelbase"][0] - 1.0) < 0.05
-        and share > 0.5,
+        (
+            abs(mass / rig["sprung_mass"][0] - 1.0) < 0.01
+            and abs(length / rig["wheelbase"][0] - 1.0) < 0.05
+            and share > 0.5
+        ),
         "mass and wheelbase agree; a > b puts the weight on the rear, against Table 3.3 (errata 14)",
     )
 
@@ -151,11 +139,8 @@ def _stiffness_claim() -> Claim:
     volume = VOLUME_OFFSET + MEAN_AREA * height
     gas = 1.4 * (gauge + ATMOSPHERE) * MEAN_AREA / volume * area / LB_PER_IN
     shape = -gauge * slope / LB_PER_IN
-    return Claim(
+    return verdict(
         "spring-stiffness",
-        "3.4",
-        "the 2M2A at 10 psig and 1.7 in is around 80 lb/in",
-        "80 lb/in",
         f"{gas + shape:.0f} lb/in ({gas:.0f} of the gas, {shape:.0f} of the area)",
         abs((gas + shape) / 80.0 - 1.0) < 0.15,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pneumo_ros.plant.similitude import HONDA_CIVIC, Scales
-from pneumo_ros.thesis.report import Chapter, Claim, Step, Table
+from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.thesis.similitude_proof import SYSTEMS, difference, laws_of
 
@@ -28,7 +28,8 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
         _nature_claim(broken["half car"]),
     ]
     lead = (
-        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the inlets open "
+        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the "
+        "inlets open "
         "to three times trim; differences are in standard deviations of each state."
     )
     return Chapter(4, "Nonlinear model of pneumatic suspensions", lead, claims, tables)
@@ -55,13 +56,11 @@ def _laws_claim() -> Claim:
     printed = {"pressure": s.mass / s.length, "stiffness": s.mass, "damping": s.mass}
     same = all(math.isclose(s.factor(name), value) for name, value in printed.items())
     diameter = math.sqrt(s.orifice_area)
-    return Claim(
+    return verdict(
         "pneumatic-laws",
-        "Eqs. 4.62, 4.79, 4.80",
-        "C_P = C_m/C_L, C_k = C_m, C_d = C_L^(3/2), C_B = C_m",
-        f"{s.mass / s.length:g}, {s.mass:g}, {s.length**1.5:.2f}, {s.mass:g}",
         f"{s.factor('pressure'):g}, {s.factor('stiffness'):g}, {diameter:.2f}, {s.factor('damping'):g}",
         same and math.isclose(diameter, s.length**1.5),
+        printed=f"{s.mass / s.length:g}, {s.mass:g}, {s.length**1.5:.2f}, {s.mass:g}",
     )
 
 
@@ -80,13 +79,13 @@ def _similar_claim(name: str, kept: tuple[float, float]) -> Claim:
 
 def _nature_claim(broken: dict[str, float]) -> Claim:
     gravity, air = broken["gravity not scaled"], broken["atmosphere not scaled"]
-    return Claim(
+    return verdict(
         "laws-sufficient",
-        "4.3, Eqs. 4.62, 4.79",
-        "the five laws suffice for similitude",
-        "sufficient",
         f"differ by {gravity:.0f} std with gravity as it is, {air:.1f} std with the atmosphere as it is",
         False,
-        "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = 5 and "
-        "the atmosphere with C_P = 2.4 (errata 18)",
+        (
+            "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = "
+            "5 and "
+            "the atmosphere with C_P = 2.4 (errata 18)"
+        ),
     )

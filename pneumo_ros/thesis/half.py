@@ -136,6 +136,13 @@ def measure(job: tuple[ThesisSettings, HalfExperiment]) -> HalfOutcome:
     return _outcome(settings, [_motion(r, settings) for r in runs], runs, [_area_error(r, settings) for r in runs])
 
 
+def heave_of(settings: ThesisSettings, experiment: HalfExperiment) -> NDArray[np.float64]:
+    """Heave acceleration of the rig over the first road, after the settling time, m/s2."""
+    if experiment.preset in CONVENTIONAL:
+        return _conventional(settings, experiment.preset, 1).heave
+    return _motion(run(settings, experiment, 1), settings).heave
+
+
 @dataclass(frozen=True)
 class _Motion:
     """What a ride is judged by, after the settling time."""

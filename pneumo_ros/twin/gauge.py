@@ -55,6 +55,15 @@ class Observation:
     noise: NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class Null:
+    """The refit of a log without its effect: gap left, parameters' logs, sensitivities per sigma (rows decimated)."""
+
+    gap: float
+    logs: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+
+
 def perturbed(car: HalfCar, logs: NDArray[np.float64]) -> HalfCar:
     """The plant with its 16 uncertain parameters multiplied by exp(logs)."""
     body, gases = car.body._asdict(), {"front": car.front, "rear": car.rear}
@@ -126,6 +135,35 @@ def refit(
         if done:
             break
     return best, at * sigma
+
+
+def quick_gap(car: HalfCar, seen: Observation, null: Null) -> float:
+    """About what :func:`refit` would leave, from the sensitivities of the same log without its effect.
+
+    Three steps with a fixed Jacobian cost four simulations instead of some sixty; good enough to search a size.
+    """
+    sigma = np.array([s for _, _, s in NUISANCE])
+    scale = np.std(seen.measured, axis=0)
+    jacobian = null.jacobian / np.tile(scale, len(seen.measured[::DECIMATE]))[:, None]
+    prior, at, best = float(np.mean(seen.noise / scale)), null.logs / sigma, np.inf
+    for _ in range(4):
+        model = free_run(perturbed(car, at * sigma), seen)
+        if not np.isfinite(model).all():
+            break
+        value = gap(model, seen)
+        if value > 0.98 * best:
+            return min(best, value)
+        best = value
+        error = ((seen.measured - model)[::DECIMATE] / scale).ravel()
+        at = np.clip(at + _damped_step(jacobian, error, at, prior, 1e-6), -3.0, 3.0)
+    return best
+
+
+def null_of(car: HalfCar, seen: Observation) -> Null:
+    """Refit of a log without effect, kept as the start and the sensitivities of the same log with one."""
+    left, logs = refit(car, seen)
+    sigma = np.array([s for _, _, s in NUISANCE])
+    return Null(left, logs, _jacobian(car, logs, free_run(perturbed(car, logs), seen), seen, sigma))
 
 
 def _damped_step(
