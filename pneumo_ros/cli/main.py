@@ -19,6 +19,7 @@ VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
+    "diagnose": "Find where the gap between a log and the model lies, which effect makes it, how far it shrinks.",
     "view": "Show a session in the browser: a log played back, or a running session.",
 }
 

@@ -1,8 +1,8 @@
 """Bounded robust least squares on the free-run error, by a projected Levenberg-Marquardt of its own.
 
-The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and its
-samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the weight
-of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
+The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and
+its samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the
+weight of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
 down-weighted (Huber) at a threshold that follows the misfit.
 
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumo_ros.gap.model import Array
+from pneumo_ros.gap.model import Array, Mask
 from pneumo_ros.gap.problem import Candidate, Problem
 
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
@@ -54,7 +54,7 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Array | slice, x: Array, fixed: int) -> float:
+def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
     """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
     r = residual[rows]
     if not np.all(np.isfinite(r)):
@@ -75,7 +75,7 @@ def fit(
     candidate: Candidate,
     start: Array,
     jacobian: Array | None = None,
-    rows: Array | None = None,
+    rows: Mask | None = None,
     iterations: int = 10,
 ) -> Fit:
     """Best unknowns from one start.
@@ -108,7 +108,7 @@ def fit(
     return state
 
 
-def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Array, spent: int = 0) -> Fit:
+def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
     residual = problem.residual(candidate, x)
     return Fit(candidate, x, cost_of(residual, rows, x, problem.fixed), residual, None, spent + 1)
 
@@ -134,9 +134,7 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     return columns
 
 
-def _step(
-    problem: Problem, state: Fit, rows: Array, bounds: tuple[Array, Array], damping: float
-) -> tuple[Fit, float]:
+def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float) -> tuple[Fit, float]:
     """The first of a few ever more damped steps that gains."""
     low, high = bounds
     H, g = normal_equations(problem, state, rows)
@@ -152,7 +150,7 @@ def _step(
     return state, damping
 
 
-def normal_equations(problem: Problem, state: Fit, rows: Array) -> tuple[Array, Array]:
+def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, Array]:
     """Curvature and gradient of half the cost at a fit that has its jacobian: (m, m) and (m,)."""
     assert state.jacobian is not None
     r = state.residual[rows]

@@ -47,7 +47,9 @@ def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active],
         # A model that is wrong bends the first moments too: its misfit must not be blamed on the initial state.
         strength = 1.0 / max(1.0, float(np.mean(r * r)))
         prior = (state - centre) / std
-        move = bounded_newton(strength * J.T @ J + np.eye(len(state)), strength * J.T @ r + prior, -9.0 - prior, 9.0 - prior)
+        move = bounded_newton(
+            strength * J.T @ J + np.eye(len(state)), strength * J.T @ r + prior, -9.0 - prior, 9.0 - prior
+        )
         state = state + std * move
     return state
 

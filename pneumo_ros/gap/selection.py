@@ -1,8 +1,8 @@
 """Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
 
 Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than
-structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of the
-library are true to.
+structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of
+the library are true to.
 """
 
 from __future__ import annotations

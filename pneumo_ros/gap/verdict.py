@@ -1,7 +1,8 @@
 """From scores to a verdict with a probability.
 
-Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the effect
-is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept from the fit?
+Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the
+effect is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept
+from the fit?
 The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
 """
 
