@@ -22,7 +22,7 @@ from pneumo_ros.units import ATMOSPHERE, GRAVITY, INCH
 Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
-SLOPE_STEP = 2.5e-4  # m: 0.01 in, a fifth of the look-up's interval, so that no slope is read across a corner's point
+SLOPE_STEP = 2.5e-4  # m, 0.01 in: less than the experiment moves; averages both slopes at a corner of the look-up
 LOWEST, HIGHEST = 1.0 * INCH, 2.3 * INCH
 OUT_OF_REACH = 1e-3  # rad/s or 1: what a law predicts where no static height exists; loses without a crash
 
