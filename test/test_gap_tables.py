@@ -27,7 +27,7 @@ def law(one: TableDiagnosis, name: str) -> float:
 
 
 def test_the_stiffness_is_that_of_the_simulated_bench() -> None:
-    """The analytic natural frequency against the simulated experiment's, all 20 points; corners of the look-up cost 4 %."""
+    """The analytic natural frequency against the simulated one, all 20 points; corners of the look-up cost 4 %."""
     bench = load_bench()
     ours = natural_frequency(bench, {}) / (2.0 * np.pi)
     for index, mass in np.ndenumerate(bench.mass):
