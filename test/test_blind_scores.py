@@ -130,7 +130,11 @@ def test_page_holds_scores_baselines_and_failures(tmp_path: Path) -> None:
     text = page.read_text()
     for word in ("top-1", "always none", "best training fit", "| e | none | none |", "Every failure (4)"):
         assert word in text
-    assert page.with_suffix(".png").stat().st_size > 5000
+    assert next(tmp_path.glob("results-t-*.png")).stat().st_size > 5000
+    write_report(page, LABELS, FOUND, {"set": "later", "seed": 2, "software": "s"})
+    both = page.read_text()
+    assert both.index("Set `later`") < both.index("Set `t`")
+    assert both.count("# The blind check") == 1
 
 
 def test_results_are_read_as_the_contract_says(tmp_path: Path) -> None:
