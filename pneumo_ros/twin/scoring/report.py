@@ -70,7 +70,9 @@ HEAD = """# The blind check: results
 Cases are made by a richer rig (`twin/`) that shares no effect law with the diagnosis; every label is sealed by a salted
 SHA-256 in the set's manifest before the diagnosis runs, and the seals are checked when the answers are opened. How:
 
-    pneumo blind make DIR --set full && pneumo blind diagnose DIR && pneumo blind score DIR --output docs/blind-results.md
+    pneumo blind make DIR --set full
+    pneumo blind diagnose DIR
+    pneumo blind score DIR --output docs/blind-results.md
 
 `gap/floor` is what the nominal model leaves after a refit inside its tolerances, over what it leaves on the same log
 without the effect. In brackets: hits, count and the Wilson 95 % interval. The four last columns are baselines scored by
