@@ -18,6 +18,7 @@ BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
+    "diagnose": "Find where the gap between a log and the model lies, which effect makes it, how far it shrinks.",
     "view": "Show a session in the browser: a log played back, or a running session.",
 }
 
