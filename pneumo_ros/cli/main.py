@@ -19,6 +19,7 @@ VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
     "diagnose": "Find where the gap between a log and the model lies, which effect makes it, how far it shrinks.",
+    "blind": "Check the diagnosis on cases whose answer is withheld: make, diagnose, score.",
     "view": "Show a session in the browser: a log played back, or a running session.",
 }
 
