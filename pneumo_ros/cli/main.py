@@ -19,6 +19,7 @@ VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "log": "Inspect, check, recover, export and compare logs.",
     "view": "See a log in the browser.",
+    "thesis": "Recompute the thesis: its tables, figures and claims, with verdicts.",
 }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pneumo_ros.thesis.ensemble import run_all
-from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, run
+from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, plant, run
 from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import INCH, SQUARE_INCH
@@ -58,6 +58,15 @@ CURVES: dict[str, tuple[str, bool, dict[str, float | str]]] = {
 }
 ESTIMATED = "Figure 6.23: first order SMFLC with estimator"
 
+PAIRS = {
+    "Figure 6.9: gain": ("flc 10", "flc 50"),
+    "Figure 6.11: volume": ("flc 10", "flc volume"),
+    "Figure 6.14: reference": ("flc 10", "mrflc"),
+    "Figure 6.18: K_s, phi": ("K 1000", "K 10000"),
+    "Figure 6.20: estimator": ("K 2000", "bounded"),
+    "Figure 6.24: payload": ("bounded", "payload"),
+}
+
 Outcomes = Mapping[str, Outcome]
 
 
@@ -75,7 +84,16 @@ def build_quarter(settings: ThesisSettings, step: Step) -> tuple[list[Claim], li
         *_sliding_claims(outcomes),
         *_estimator_claims(outcomes, curves, convergence, settings),
     ]
-    return claims, [_table(outcomes)], [_curves_picture(curves), _response_picture(settings), _area_picture(settings)]
+    return (
+        claims,
+        [_table(outcomes)],
+        [
+            _curves_picture(curves),
+            _response_picture(settings),
+            _pairs_picture(settings),
+            _area_picture(settings),
+        ],
+    )
 
 
 def sensitivity(settings: ThesisSettings) -> dict[str, np.ndarray]:
@@ -160,6 +178,7 @@ def _feedback_claims(o: Outcomes, curves: dict[str, np.ndarray]) -> list[Claim]:
                 f"(pole 50)"
             ),
             min(o["flc 10"].least_tyre_force, o["flc 50"].least_tyre_force) > 0.0,
+            "at pole 50 valve limits and sampling make a limit cycle",
         ),
         verdict(
             "mrflc",
@@ -195,7 +214,12 @@ def _sliding_claims(o: Outcomes) -> list[Claim]:
             overshoot == "third_order_integral_smc",
         ),
         verdict("smc-offset", f"largest: {offset} ({shown('offset_in', 'in')})", offset == "third_order_smc"),
-        verdict("smflc-rise", f"{fastest} ({shown('rise', 's')})", fastest == "third_order_smflc"),
+        verdict(
+            "smflc-rise",
+            f"{fastest} ({shown('rise', 's')})",
+            fastest == "third_order_smflc",
+            "the integral of the error speeds the other one up, and makes it overshoot; fastest of the rest",
+        ),
         verdict(
             "gain-layer",
             (
@@ -254,6 +278,7 @@ def _estimator_claims(
                 f"{spread(ESTIMATED):.1f}"
             ),
             spread(ESTIMATED) < min(with_out),
+            "at K_s 10000 the sliding gain hides the pole altogether, at a worse ride",
         ),
         verdict(
             "forgetting", f"rms error: {shown} in2", max(methods, key=lambda name: methods[name]) == "least_squares"
@@ -328,6 +353,24 @@ def _response_picture(settings: ThesisSettings) -> Picture:
     axes[1].set(xlabel="s", ylabel="inlet, in2")
     axes[0].legend(fontsize=7)
     return Picture("Figure 6.15: the sliding family", figure, "start below design height, seed 1")
+
+
+def _pairs_picture(settings: ThesisSettings) -> Picture:
+    """The thesis's comparisons two by two: heave about the target, and tyre force."""
+    figure, axes = canvas(2, len(PAIRS), width=3.2 * len(PAIRS), height=2.4)
+    for i, (title, names) in enumerate(PAIRS.items()):
+        car, trim = plant(settings, False)
+        for name in names:
+            r = run(settings, EXPERIMENTS[name], 1)
+            axes[i].plot(r.times, (r.states[:, 0] - trim.state[0]) / INCH, lw=0.7, label=name)
+            force = car.corner.tyre_stiffness * (r.road - r.states[:, 1])
+            axes[len(PAIRS) + i].plot(r.times, force, lw=0.5)
+        axes[i].set_title(title, fontsize=8)
+        axes[i].legend(fontsize=6)
+        axes[len(PAIRS) + i].set_xlabel("s")
+    axes[0].set_ylabel("heave, in")
+    axes[len(PAIRS)].set_ylabel("tyre force, N")
+    return Picture("Figures 6.9 to 6.24: comparisons", figure, "seed 1; heave about the target")
 
 
 def _area_picture(settings: ThesisSettings) -> Picture:
