@@ -31,10 +31,10 @@ def summary_table(active: Summary, passive: Summary | None) -> Table:
             other = theirs[index][2]
             cells += [_shown(other, form), _change(values, other) if form != "%.2f" else ""]
         table.add_row(*cells)
-    table.add_row("inlets saturated, f / r (% of time)", _shown([100 * s for s in active.saturation], "%.1f"))
+    table.add_row("inlets saturated, f / r (%)", _shown([100 * s for s in active.saturation], "%.1f"))
     if active.area_error is not None:
         errors = [e / SQUARE_INCH for e in active.area_error]
-        table.add_row("area estimate, rms error, f / r (in2)", _shown(errors, "%.3f"))
+        table.add_row("area error, rms, f / r (in2)", _shown(errors, "%.3f"))
     if passive is not None:
         table.caption = "passive: valves at trim on the same road, simulated"
         table.caption_justify = "left"
@@ -43,12 +43,12 @@ def summary_table(active: Summary, passive: Summary | None) -> Table:
 
 def _ride_rows(ride: Ride) -> list[Row]:
     return [
-        ("heave acceleration, rms", "m/s2", [ride.heave_rms], "%.3f"),
+        ("heave accel., rms", "m/s2", [ride.heave_rms], "%.3f"),
         ("same, full scale", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
-        ("pitch acceleration, rms", "rad/s2", [ride.pitch_rms], "%.3f"),
-        ("mean personal rating", "0 to 5", [ride.rating], "%.2f"),
-        ("tyre load variation, f / r", "% of rest", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
-        ("suspension travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
+        ("pitch accel., rms", "rad/s2", [ride.pitch_rms], "%.3f"),
+        ("mean personal rating", "0-5", [ride.rating], "%.2f"),
+        ("tyre load variation, f / r", "%", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
+        ("travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
     ]
 
 
@@ -74,4 +74,5 @@ def timing_table(summary: Summary) -> Table:
 
 
 def _milliseconds(values: dict[str, str], key: str) -> str:
-    return f"{float(values.get(key, 'nan')) / 1e3:.2f}"
+    value = float(values.get(key, "nan")) / 1e3
+    return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"

@@ -30,7 +30,7 @@ from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR
-from pneumo_ros.session.timing import TimingRecord
+from pneumo_ros.session.timing import LoopTiming
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
@@ -99,9 +99,8 @@ class RigNode(Node):
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
-        self.execution, self.interval = TimingRecord(), TimingRecord()
+        self.timing = LoopTiming()
         self._outgoing: list[tuple[Topic, Publisher]] = []
-        self._last_step = 0
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -198,15 +197,12 @@ class RigNode(Node):
     # -- health ----------------------------------------------------------------------------------------------------
 
     def timed(self, start_ns: int) -> None:
-        """Account for one step that began at ``start_ns`` (monotonic)."""
-        if self._last_step:
-            self.interval.add((start_ns - self._last_step) * 1e-9)
-        self._last_step = start_ns
-        self.execution.add((time.monotonic_ns() - start_ns) * 1e-9)
+        """Account for one step that began at ``start_ns`` (monotonic) and ends now."""
+        self.timing.mark(start_ns, time.monotonic_ns())
 
     def health(self) -> dict[str, str]:
         """Key figures of /diagnostics; nodes add theirs."""
-        return {"steps": str(self.execution.count), **self.interval.summary("period"), **self.execution.summary("step")}
+        return self.timing.summary()
 
     def health_level(self) -> tuple[bytes, str]:
         """(level, message) of /diagnostics."""

@@ -36,11 +36,11 @@ class ControllerNode(RigNode):
         self.controller.step(self.controller.init(), np.full(16, 1e-3))
         self.state: NDArray[np.float64] | None = None
         self._safe = self.controller.at_rest.command
-        self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode
-        self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode
+        self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
+        self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
         self._publish = self.publisher(topics.COMMAND).publish
         self._publish_sliding = self.publisher(topics.SLIDING).publish
-        self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode
+        self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
         self._last_stamp = 0
         self._refused = 0
@@ -56,20 +56,19 @@ class ControllerNode(RigNode):
 
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
-        stamp, values = self._read(data)
-        estimate = np.array(values)
+        stamp, estimate = self._read(data)
         if self.state is None or stamp < self._last_stamp:  # a replayed log jumped back: begin again
             self.state = self.controller.init(estimate)
         self._last_stamp = stamp
         state, command, telemetry = self.controller.step(self.state, estimate)
-        if math.isfinite(command.sum()):
+        if math.isfinite(command[0] + command[1] + command[2] + command[3]):
             self.state = state
         else:
             command = self._refuse(stamp)
-        self._publish(self._command(stamp, command.tolist()))
+        self._publish(self._command(stamp, command))
         if self._steps % self.values["telemetry_every"] == 0:
             shown = np.concatenate([telemetry, self.state[[0, 3]]])
-            self._publish_sliding(self._sliding(stamp, shown.tolist()))
+            self._publish_sliding(self._sliding(stamp, shown))
         self._steps += 1
         self.timed(start)
 

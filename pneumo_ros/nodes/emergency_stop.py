@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
 from std_srvs.srv import Trigger
 
 from pneumo_ros.nodes.base import ERROR, OK, RigNode
@@ -11,7 +13,7 @@ from pneumo_ros.session.topics import ESTOP
 
 TRIP_SERVICE, RESET_SERVICE = "/rig/estop_trip", "/rig/estop_reset"
 _FLAG = 4  # offset of the bool in a serialised std_msgs/Bool
-CLOSED = (0.0, 0.0, 0.0, 0.0)  # m2: closed valves hold the air in the springs, as without power
+CLOSED = np.zeros(4)  # m2: closed valves hold the air in the springs, as without power
 
 
 class EmergencyStop:
@@ -34,7 +36,7 @@ class EmergencyStop:
         node.create_service(Trigger, TRIP_SERVICE, self._on_trip)
         node.create_service(Trigger, RESET_SERVICE, self._on_reset)
 
-    def applied(self, areas: Sequence[float]) -> Sequence[float]:
+    def applied(self, areas: NDArray[np.float64]) -> NDArray[np.float64]:
         """The orifice areas that reach the valves, m2: the commanded ones, or all closed."""
         return CLOSED if self.latched else areas
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
@@ -45,8 +46,8 @@ class PlantNode(RigNode):
         self.index = -1
         self.start_ns = START_NS
         self.road = np.zeros((2, 2))
-        self._commands: dict[int, tuple[float, ...]] = {}
-        self._roads: dict[int, tuple[float, ...]] = {}
+        self._commands: dict[int, NDArray[np.float64]] = {}
+        self._roads: dict[int, NDArray[np.float64]] = {}
         self._deadlines: Deadlines | None = None
         self._next_progress = 0.0
         self._make_topics()
@@ -64,8 +65,8 @@ class PlantNode(RigNode):
         self._publish_truth = self.publisher(topics.TRUTH).publish
         self._send_clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
-        self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
-        self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode
+        self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode_array
+        self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode_array
         self.subscribe(topics.COMMAND, self._on_command)
         self.subscribe(topics.ROAD, self._on_road)
         self._others_ready: set[str] = set()

@@ -99,6 +99,18 @@ def build_surface(
     )
 
 
+def build_linear_surface(
+    heights: NDArray[np.float64], pressures: NDArray[np.float64], areas: NDArray[np.float64]
+) -> AreaSurface:
+    """Linear between table entries and beyond them: a plain look-up table (Section 5.6). Arguments as above."""
+    slopes = np.diff(areas, axis=0) / np.diff(heights)[:, None]
+    left = np.vstack([areas[:1], areas[:-1], areas[-1:]])
+    slope = np.vstack([slopes[:1], slopes, slopes[-1:]])
+    cubics = np.zeros((areas.shape[1], len(heights) + 1, 4))
+    cubics[:, :, 2], cubics[:, :, 3] = slope.T, left.T
+    return AreaSurface(np.ascontiguousarray(heights, dtype=float), np.ascontiguousarray(pressures, dtype=float), cubics)
+
+
 @lru_cache(maxsize=8)
 def load_surface(path: str | None = None) -> AreaSurface:
     """Read a surface from CSV (heights in inches down, columns named ``<p>_psig``, areas in square inches).

@@ -182,11 +182,11 @@ class LogWriter:
                 elif log_ns == AT_LATEST:
                     log_ns = self._latest
                 self._latest = log_ns
+                if self._total % DISK_CHECK_EVERY == 1:
+                    self._check_disk()
                 if self._stopped:
                     continue
                 try:
-                    if self._total % DISK_CHECK_EVERY == 1:
-                        self._check_disk()
                     add(channel.number, log_ns, data, log_ns)
                 except OSError as error:
                     self._stopped = f"the file system refused to write ({error})"

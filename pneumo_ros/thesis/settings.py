@@ -27,7 +27,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("quarter_damping", 50.0, "N s/m", "bushing damping of the quarter car", 0.0, 1e4),
     Parameter("start_height_in", 1.5, "in", "spring height a controlled quarter car starts from", 1.25, 2.1),
     Parameter("estimator_bandwidth", 200.0, "1/s", "lambda_0 of Eq. 6.51 with exact accelerations", 1.0, 500.0),
-    Parameter("bench_amplitude_in", 0.01, "in", "base motion of Tables 5.4 and 5.5", 1e-4, 0.2),
+    Parameter("bench_amplitude_in", 0.002, "in", "base motion of Tables 5.4 and 5.5", 1e-4, 0.2),
     Parameter("bench_damping", 50.0, "N s/m", "c of Eq. 5.8", 0.0, 1e4),
 )
 
