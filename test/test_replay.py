@@ -64,7 +64,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory, context: Context) -> Log:
         SessionRecorderNode(context, {"output": str(path)}),
     ]
     controller = nodes[3]
-    timer = controller.create_timer(0.001, lambda: change() if controller.execution.count > 300 else None)
+    timer = controller.create_timer(0.001, lambda: change() if controller._last_stamp > 1_600_000_000 else None)
 
     def change() -> None:
         timer.cancel()
