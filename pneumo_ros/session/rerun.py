@@ -78,6 +78,9 @@ def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
     controller = build_controller(rig, period, values["controller"])
     run = close_loop(car, rig, estimator, controller, road, seed=seed)
     notes.append("the run starts from rest at the trim, whatever the rig was doing when the log began")
+    notes.append(
+        "sensor noise steers the valves: with other noise than the session's, motions differ in detail, not size"
+    )
     return Rerun(
         run.times[:-1],
         run.measurements,
