@@ -62,6 +62,7 @@ setup(
         "dev": [
             "pytest>=8",
             "pytest-timeout>=2.3",
+            "pytest-rerunfailures>=14",
             "hypothesis>=6.100",
             "ruff>=0.6",
             "mypy>=1.11",
