@@ -148,7 +148,7 @@ def _event_row(event: Event, report: Report) -> Row:
     start = min((t.first_ns for t in report.topics if t.timing is not None), default=0)
     values = ", ".join(f"{key} {value}" for key, value in event.values.items())
     level = LEVELS.get(event.level, str(event.level))
-    return (f"{(event.time_ns - start) * 1e-9:.3f}", level, event.source, event.code, event.message, values)
+    return (f"{max(event.time_ns - start, 0) * 1e-9:.3f}", level, event.source, event.code, event.message, values)
 
 
 def _tone(findings: Sequence[Finding], events: Sequence[Event]) -> str:
