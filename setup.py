@@ -35,7 +35,7 @@ setup(
     maintainer="pneumo_ros maintainers",
     maintainer_email="maintainers@pneumo-ros.example",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.gap.report": ["*.j2"]},
+    package_data={f"{NAME}.gap.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"]},
     python_requires=">=3.10,<3.14",
     install_requires=[
         "setuptools",
@@ -62,6 +62,7 @@ setup(
         "dev": [
             "pytest>=8",
             "pytest-timeout>=2.3",
+            "pytest-rerunfailures>=14",
             "hypothesis>=6.100",
             "ruff>=0.6",
             "mypy>=1.11",

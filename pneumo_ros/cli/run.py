@@ -51,6 +51,7 @@ def run(
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
     ] = False,
+    report: Annotated[bool, typer.Option(help="Write an HTML page beside the log.")] = True,
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
@@ -73,7 +74,7 @@ def run(
     console = Console()
     with beside(domain_id) if view else nullcontext() as dashboard:
         _run_session(console, values, target, single_process, domain_id)
-        _report(console, target, values, picture)
+        _report(console, target, values, picture, report)
         if dashboard is not None:
             console.print("the dashboard stays until Ctrl-C")
             dashboard.wait()
@@ -222,8 +223,8 @@ def _save_what_is_left(target: Path) -> None:
     out.print(f"recovered {found.kept} messages: {found.output}")
 
 
-def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
-    """Table of the active run beside passive valves on the same road, and the picture."""
+def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+    """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.session.passive import passive_twin
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
@@ -240,6 +241,13 @@ def _report(console: Console, target: Path, values: Values, picture: bool) -> No
         png = target.with_suffix(".png")
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}")
+    if page:
+        from pneumo_ros.session.reading import read_log
+        from pneumo_ros.session.report import write_report
+
+        html = target.with_suffix(".html")
+        write_report(read_log(target), html, other)
+        console.print(f"report   {html}")
 
 
 if __name__ == "__main__":
