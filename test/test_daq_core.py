@@ -19,6 +19,7 @@ from pneumo_ros.daq.core import DriverCore, Phase
 from pneumo_ros.daq.device import Device
 from pneumo_ros.daq.frames import DeviceState, Hello, OutputRange, encode
 from pneumo_ros.daq.intake import Measurement
+from pneumo_ros.daq.limits import MEASURED, LimitMonitor
 from pneumo_ros.daq.reasons import Event, Reason
 from pneumo_ros.daq.safety_config import Limit, SafetyConfig, load_safety
 from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
@@ -332,6 +333,16 @@ def test_limits_warn_then_trip_after_their_persistence(estop: bool) -> None:
     assert bench.core.mode is (Mode.ESTOP if estop else Mode.SAFE)
     outside = [m.stamp_ns for m in bench.measurements[count:] if m.values[5] > 5.0e5]
     assert 15 <= bench.safe_after(outside[0]) < 50
+
+
+def test_a_quantity_that_hovers_at_its_limit_is_one_warning() -> None:
+    limits = LimitMonitor({name: Limit(-math.inf, math.inf, -math.inf, math.inf, 0.0, False) for name in MEASURED}
+                          | {"front_pressure": Limit(1e5, 4e5, -math.inf, math.inf, 0.0, False)})  # fmt: skip
+    rng, told = random.Random(1), []
+    for i in range(4000):
+        pressure = 4e5 + rng.gauss(0.0, 1e3) if i < 2000 else 3.9e5
+        told += limits.step([0.03, 0.03, -0.016, -0.016, pressure, 4e5, 7.9e5], 1e-3)
+    assert [finding.reason for finding in told] == [Reason.LIMIT_WARN, Reason.LIMIT_CLEAR]
 
 
 def test_frames_that_pass_the_crc_by_chance_must_continue_the_counters() -> None:
