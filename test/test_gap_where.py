@@ -18,7 +18,7 @@ from pneumo_ros.gap.where import Start, conditional_gaps, habitat, locate, place
 from pneumo_ros.gap.where.design import car_of, design_of, inputs_of, sensor_noise
 from pneumo_ros.gap.where.locate import corrected_residual
 from pneumo_ros.gap.where.regimes import bands, harmonics, regimes
-from pneumo_ros.gap.where.solve import best_subset, box_minimum, forms_of, shapley
+from pneumo_ros.gap.where.solve import Rows, best_subset, box_minimum, forms_of, shapley
 from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
@@ -86,7 +86,9 @@ def test_shares_add_up_and_equals_share_equally() -> None:
     rng = np.random.default_rng(1)
     shape, other = rng.normal(size=(2, 400))
     columns = np.column_stack([rng.normal(size=400), shape, shape, other])
-    forms = forms_of((-3.0 * shape - other, columns), (-3.0 * shape - other, columns), np.zeros(1), ["a", "b", "c"])
+    forms = forms_of(
+        Rows(-3.0 * shape - other, columns, {}), Rows(-3.0 * shape - other, columns, {}), np.zeros(1), ["a", "b", "c"]
+    )
     shares = shapley(forms, ["a", "b", "c"])
     assert sum(shares.values()) == pytest.approx(forms.value(()) - forms.value(["a", "b", "c"]), rel=1e-9)
     assert shares["a"] == pytest.approx(shares["b"], rel=1e-3) and shares["a"] > shares["c"] > 0.0
@@ -99,7 +101,7 @@ def test_exchange_finds_two_places_that_only_work_together() -> None:
     decoy = left + right + 0.3 * rng.normal(size=500)
     residual = -10.0 * (left + right)
     columns = np.column_stack([1e-6 * rng.normal(size=500), left, right, decoy])
-    forms = forms_of((residual, columns), (residual, columns), np.zeros(1), ["left", "right", "decoy"])
+    forms = forms_of(Rows(residual, columns, {}), Rows(residual, columns, {}), np.zeros(1), ["left", "right", "decoy"])
     names = ["left", "right", "decoy"]
     assert best_subset(forms, 1, [], names) == ["decoy"]
     assert set(best_subset(forms, 2, ["decoy"], names)) == {"left", "right"}
