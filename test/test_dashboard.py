@@ -105,7 +105,9 @@ def test_playback_moves_steps_seeks_and_loops(log_path: Path) -> None:
     play.playing = True
     play.tick(100.0)
     assert shown() == pytest.approx(15.998) and play.status().state == "paused"
-    play.playing = play.loop = True
+    play.play(True)  # at the end: from the beginning
+    assert shown() == 0.0 and play.status().state == "playing"
+    play.loop = True
     play.tick(100.0)
     assert shown() == 0.0 and play.status().state == "playing"
     play.seek(-5.0)

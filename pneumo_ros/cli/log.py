@@ -111,6 +111,22 @@ def compare(
         _show_comparison(result)
 
 
+@app.command()
+def report(
+    log: LogPath,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Page to write (.html); beside the log by default.")
+    ] = None,
+) -> None:
+    """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
+    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.session.report import write_report
+
+    target = output or log.with_suffix(".html")
+    write_report(read_log(log), target)
+    console.print(f"report   {target}", highlight=False, soft_wrap=True)
+
+
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
     console.print(_topics_table(report.topics))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -40,6 +42,9 @@ def replay(
     closed_loop: Annotated[
         bool, typer.Option("--closed-loop", help="The recorded road through the rig's model, which then reacts.")
     ] = False,
+    diagnosis: Annotated[
+        Path | None, typer.Option(help="diagnosis.json: --closed-loop runs the rig as it was diagnosed.")
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the log with the replayed topics in place (.mcap).")
     ] = None,
@@ -59,8 +64,8 @@ def replay(
     found, remark = read_or_salvage(log)
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
-    if closed_loop:
-        _closed_loop(found, parse_overrides(set_), plot)
+    if closed_loop or diagnosis is not None:
+        _closed_loop(found, parse_overrides(set_), diagnosis, plot)
     elif stepped or set_:
         _stepped(found, parse_overrides(set_), output, plot)
     else:
@@ -170,17 +175,36 @@ def _draw(result: Replayed, path: Path, title: str) -> None:
     console.print(f"picture  {path}", highlight=False, soft_wrap=True)
 
 
-def _closed_loop(log: Log, overrides: Mapping[str, Mapping[str, Any]], plot: Path | None) -> None:
+def _closed_loop(
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, plot: Path | None
+) -> None:
     from pneumo_ros.session.rerun import draw_rerun
     from pneumo_ros.session.rerun import rerun as run_again
 
-    result = run_again(log, overrides)
+    result = run_again(log, overrides) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
     for note in result.notes:
         console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
     console.print(rerun_table(result))
     if plot is not None:
         draw_rerun(result, plot, f"{log.path.name}: its road through the rig's model in closed loop")
         console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
+
+
+def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path) -> Rerun:
+    from pneumo_ros.gap.closed_loop import rerun_diagnosed
+    from pneumo_ros.gap.signals import read_signals
+    from pneumo_ros.session.inspection import read_setups, seed_of
+    from pneumo_ros.session.replay import plan
+
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read the diagnosis ({error})", where=path, remedy="give diagnosis.json") from error
+    setups, notes = list(read_setups(log)), list[str]()
+    values = [plan(setups, node, overrides.get(node, {}), notes).start for node in ("estimator", "controller")]
+    seed = int(seed_of(log).get("plant", 0))
+    result = rerun_diagnosed(read_signals(log.path), document, values[0], values[1], seed)
+    return replace(result, notes=(*result.notes, *notes))
 
 
 def rerun_table(result: Rerun) -> Table:

@@ -11,7 +11,7 @@ import numpy as np
 from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.compete import Contest, Effort, Progress, compete, with_jacobian
 from pneumo_ros.gap.diagnosis import Diagnosis, EditTest, Experiment, Gap, Ranked
-from pneumo_ros.gap.fit import Fit, fit
+from pneumo_ros.gap.fit import Fit, fit, sensitivities
 from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, noise_floor, settle, total_gap
 from pneumo_ros.gap.model import Active, Array, Mask, Model
 from pneumo_ros.gap.places import effect_shares
@@ -186,7 +186,7 @@ def _report(
 def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
     """Fitted once more on all blocks, with fresh sensitivities."""
     again = fit(problem, one.candidate, one.x, one.jacobian, rows=rows, iterations=4)
-    return with_jacobian(problem, again)
+    return sensitivities(problem, again)
 
 
 def _held(problem: Problem, one: Fit, holdout: Any) -> HeldOut:

@@ -20,7 +20,8 @@ from pneumo_ros.gap.problem import Candidate, Problem
 
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
 HUBER = 4.0  # robust sigmas
-STEP = 0.02  # forward difference in scaled units
+STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
+CENTRAL = 0.05  # half width of the central differences
 TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
 NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
 COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
@@ -132,6 +133,19 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
         column = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
         columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
     return columns
+
+
+def sensitivities(problem: Problem, state: Fit) -> Fit:
+    """The fit with central differences of the full model: for what is reported, where degenerate directions matter."""
+    columns = np.empty((*state.residual.shape, len(state.x)))
+    low, high = problem.bounds(state.candidate)
+    for m in range(len(state.x)):
+        ends = [float(np.clip(state.x[m] + s, low[m], high[m])) for s in (CENTRAL, -CENTRAL)]
+        one = np.arange(len(state.x)) == m
+        up, down = (problem.residual(state.candidate, np.where(one, end, state.x)) for end in ends)
+        column = (up - down) / (ends[0] - ends[1])
+        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+    return replace(state, jacobian=columns)
 
 
 def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float) -> tuple[Fit, float]:

@@ -16,6 +16,9 @@ from pneumo_ros.gap.fit import COST_FLOOR, Fit
 from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 
+TOLL = 4.0  # of the cost, for each parameter
+SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
+
 
 @dataclass(frozen=True)
 class Thresholds:
@@ -102,7 +105,11 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
 
 
 def _simplest(rivals: Sequence[Scored]) -> Scored:
-    """Fewest parameters among those within one standard error of the best."""
+    """Among those within one standard error of the best: least training cost, each parameter paying :data:`TOLL`.
+
+    The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
+    structures that predict alike, the one that needs no stretched tolerance is right.
+    """
     best = min(rivals, key=lambda s: s.level)
-    close = [s for s in rivals if s.level - best.level <= min(standard_error(s, best), 0.05 * best.level)]
-    return min(close, key=lambda s: (len(s.fit.x), s.level))
+    close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
+    return min(close, key=lambda s: s.fit.cost + TOLL * len(s.fit.x))

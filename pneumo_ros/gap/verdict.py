@@ -82,12 +82,14 @@ def _named(
     refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
 ) -> dict[Candidate, float]:
     """Softmax of scores; each further effect pays what chance would give it, and more where laws are only similar."""
+    tolerances = len(refit.fit.x)
     form = limits.model_form**2 * refit.level
 
     def height(s: Scored) -> float:
         level = np.log(calibration.floor * 0.3 + form + s.level)
         toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
-        return float(-calibration.sharpness * (level + toll))
+        stretched = 0.5 * float(np.sum(s.fit.x[:tolerances] ** 2))
+        return float(-calibration.sharpness * (level + toll) - stretched)
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())

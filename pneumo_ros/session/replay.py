@@ -125,8 +125,9 @@ def replay(log: Log, overrides: Overrides | None = None) -> Replayed:
     """
     given = {node: dict(values) for node, values in (overrides or {}).items()}
     notes: list[str] = []
-    rig, period = log.config or load_rig(), control_period(log, notes)
-    plans = {node: plan(log, node, given.get(node, {}), notes) for node in TABLES}
+    setups = list(read_setups(log))
+    rig, period = log.config or load_rig(), control_period(log, setups, notes)
+    plans = {node: plan(setups, node, given.get(node, {}), notes) for node in TABLES}
     measured = measurements(log)
     recorded = {t.name: track(log, t) for t in (topics.ESTIMATE, topics.COMMAND, topics.SLIDING) if has(log, t)}
     taken = _only(measured, recorded.get(topics.ESTIMATE.name))
@@ -185,9 +186,9 @@ def measurements(log: Log) -> Track:
     return Track(common, np.hstack(columns))
 
 
-def control_period(log: Log, notes: list[str]) -> float:
+def control_period(log: Log, setups: Sequence[Setup], notes: list[str]) -> float:
     """The session's control period, s: from its parameters, else from the measurements' stamps."""
-    for setup in read_setups(log):
+    for setup in setups:
         if setup.node in TABLES and "rate_hz" in setup.parameters:
             return round(1e9 / float(setup.parameters["rate_hz"])) * 1e-9
     steps = np.diff(log.joint(topics.DISPLACEMENT.name).stamp_ns)
@@ -196,7 +197,7 @@ def control_period(log: Log, notes: list[str]) -> float:
     return period
 
 
-def plan(log: Log, node: str, overrides: Mapping[str, Value], notes: list[str]) -> Plan:
+def plan(setups: Sequence[Setup], node: str, overrides: Mapping[str, Value], notes: list[str]) -> Plan:
     """What a node ran with, ``overrides`` laid over it throughout.
 
     Raises
@@ -208,13 +209,13 @@ def plan(log: Log, node: str, overrides: Mapping[str, Value], notes: list[str]) 
     names = {parameter.name for parameter in table}
     given = settings(table, {ALIASES.get(k, k): v for k, v in overrides.items()}, "--set " + node)
     wanted = {name: given[name] for name in (ALIASES.get(k, k) for k in overrides)}
-    setups = [s for s in read_setups(log) if s.node == node and names & set(s.parameters)]
-    if not setups:
+    own = [s for s in setups if s.node == node and names & set(s.parameters)]
+    if not own:
         notes.append(f"the log does not state the parameters of {node}; today's defaults are taken")
         return Plan(settings(table, wanted))
-    steps = [_checked(table, setup, wanted, notes) for setup in setups]
+    steps = [_checked(table, setup, wanted, notes) for setup in own]
     found = Plan(steps[0])
-    for setup, values in zip(setups[1:], steps[1:], strict=True):
+    for setup, values in zip(own[1:], steps[1:], strict=True):
         before = found.changes[-1][1] if found.changes else found.start
         if values != before:
             found.changes.append((setup.time_ns, values))

@@ -20,7 +20,7 @@ from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 from pneumo_ros.session import topics
-from pneumo_ros.session.inspection import seed_of
+from pneumo_ros.session.inspection import read_setups, seed_of
 from pneumo_ros.session.reading import Log
 from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
 
@@ -65,9 +65,10 @@ def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
     if not has(log, topics.ROAD):
         raise InputError("no road in the log", where=log.path, key=topics.ROAD.name, remedy="record /road/profile")
     notes: list[str] = []
-    rig, period = log.config or load_rig(), control_period(log, notes)
+    setups = list(read_setups(log))
+    rig, period = log.config or load_rig(), control_period(log, setups, notes)
     given = overrides or {}
-    values = {node: plan(log, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
+    values = {node: plan(setups, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
     car, _ = nominal_half_car(rig)
     measured = measurements(log)
     start = int(measured.stamp_ns[0])
@@ -77,6 +78,9 @@ def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
     controller = build_controller(rig, period, values["controller"])
     run = close_loop(car, rig, estimator, controller, road, seed=seed)
     notes.append("the run starts from rest at the trim, whatever the rig was doing when the log began")
+    notes.append(
+        "sensor noise steers the valves: with other noise than the session's, motions differ in detail, not size"
+    )
     return Rerun(
         run.times[:-1],
         run.measurements,
