@@ -132,8 +132,8 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
     names = final.testable()
     chosen = _smallest(choice, names)
-    sets = chosen or best_subset(choice, 3, [], names)
-    refit_square = final.value(())
+    sets = chosen or best_subset(choice, min(3, len(names)), [], names)
+    refit_square = max(final.value(()), 1e-12)
     shares = {place: max(part, 0.0) / refit_square for place, part in shapley(final, sets).items()}
     alone = {place: 1.0 - final.value([place]) / refit_square for place in names}
     return Location(
@@ -215,7 +215,7 @@ def _smallest(forms: Forms, places: Sequence[str]) -> list[str]:
     for size in range(1, min(LARGEST, len(places)) + 1):
         sets.append(best_subset(forms, size, sets[-1], places))
         levels.append(forms.value(sets[-1]))
-    if levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]:
+    if len(levels) < 2 or (levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]):
         return []
     for size, level in enumerate(levels[1:], start=1):
         ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]
