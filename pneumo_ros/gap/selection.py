@@ -54,11 +54,13 @@ class Scored:
     fit : the candidate
     level : mean square, sigmas
     blocks : (B,) mean square of each selection block
+    stretch : sum of squares of the nuisance parameters, in prior sigmas
     """
 
     fit: Fit
     level: float
     blocks: Array
+    stretch: float
 
     @property
     def size(self) -> int:
@@ -75,18 +77,12 @@ def score(problem: Problem, fit: Fit) -> Scored:
         rows = problem.block == number
         blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
     values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
-    return Scored(fit, float(np.mean(values)), values)
+    return Scored(fit, float(np.mean(values)), values, float(np.sum(fit.x[: len(problem.model.parameters)] ** 2)))
 
 
 def advantage(poorer: Scored, richer: Scored) -> float:
     """Fall of log mean square from the poorer to the richer structure."""
     return float(np.log((FORM + poorer.level) / (FORM + richer.level)))
-
-
-def relief(poorer: Scored, richer: Scored, refit: Scored) -> float:
-    """Fall of the squared prior sigmas of nuisance parameters and initial state."""
-    fixed = len(refit.fit.x)
-    return float(np.sum(poorer.fit.x[:fixed] ** 2) - np.sum(richer.fit.x[:fixed] ** 2))
 
 
 def standard_error(one: Scored, other: Scored) -> float:
@@ -108,7 +104,7 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         poorer = chosen
         fallen = poorer.level - best.level
         better = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
-        relieved = relief(poorer, best, refit) > limits.relief and advantage(poorer, best) > -0.1
+        relieved = poorer.stretch - best.stretch > limits.relief and advantage(poorer, best) > -0.1
         evidence = better or (size == 1 and relieved)
         beyond_form = fallen > limits.model_form**2 * refit.level
         if evidence and (size == 1 or beyond_form):

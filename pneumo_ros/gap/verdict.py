@@ -83,7 +83,6 @@ def _named(
 ) -> dict[Candidate, float]:
     """Softmax of scores; each further effect pays what chance would give it, its many rivals share one chance, and
     differences within what laws of the right kind leave count less."""
-    tolerances = len(refit.fit.x)
     form = limits.model_form**2 * refit.level
 
     count = {size: sum(f.size == size for f in finalists) for size in (0, 1, 2)}
@@ -92,8 +91,7 @@ def _named(
         level = np.log(FORM + form + s.level)
         toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
         toll += np.log(max(1, count[s.size])) / calibration.sharpness
-        stretched = 0.5 * float(np.sum(s.fit.x[:tolerances] ** 2))
-        return float(-calibration.sharpness * (level + toll) - stretched)
+        return float(-calibration.sharpness * (level + toll) - 0.5 * s.stretch)
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())
