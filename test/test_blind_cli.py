@@ -1,4 +1,4 @@
-"""`pneumo blind` from the command line: seals grow, scores are written, a changed verdict fails, mistakes are one line."""
+"""`pneumo blind` at the command line: seals grow, scores are written, a changed verdict fails, mistakes are told."""
 
 from __future__ import annotations
 
