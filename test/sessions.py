@@ -18,9 +18,10 @@ def own_domain() -> int:
     return 1 + (os.getpid() * 13 + next(_next) * 7) % 100
 
 
-def start(*options: str) -> subprocess.Popen[str]:
+def start(*options: str, domain: int | None = None) -> subprocess.Popen[str]:
     """`pneumo run` with options, in a domain of its own."""
-    command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--domain-id", str(own_domain()), *options]
+    domain = own_domain() if domain is None else domain
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--domain-id", str(domain), *options]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
@@ -66,3 +67,28 @@ def children(parent: int) -> dict[str, int]:
 def kill(pid: int) -> None:
     """SIGKILL."""
     os.kill(pid, signal.SIGKILL)
+
+
+def set_parameter(domain: int, node: str, name: str, value: object, timeout: float = 20.0) -> str:
+    """Set a parameter of a running node as `ros2 param set` does; '' or the reason it was refused."""
+    import rclpy
+    from rclpy.context import Context
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.parameter import Parameter
+    from rclpy.parameter_client import AsyncParameterClient
+
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    try:
+        asker = rclpy.create_node("asker", context=context)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(asker)
+        client = AsyncParameterClient(asker, node)
+        assert client.wait_for_services(timeout), f"{node} has no parameter services"
+        future = client.set_parameters([Parameter(name, value=value)])
+        executor.spin_until_future_complete(future, timeout)
+        result = future.result()
+        assert result is not None, f"{node} did not answer"
+        return "" if result.results[0].successful else str(result.results[0].reason)
+    finally:
+        context.try_shutdown()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
@@ -41,6 +42,11 @@ def test_joint_codec_agrees_with_rclpy(topic: topics.Topic) -> None:
     assert decoder.decode(serialize_message(theirs)) == (STAMP, tuple(values))
     assert decoder.decode(data) == (STAMP, tuple(values))
     assert stamp_of(data) == STAMP
+    stamp, array = decoder.decode_array(serialize_message(theirs))
+    assert stamp == STAMP and array.flags.writeable
+    np.testing.assert_array_equal(array, values)
+    if not topic.rates:
+        assert JointEncoder(topic.frame_id, topic.names).encode_array(STAMP, array) == data
 
 
 def test_decoder_matches_by_name_and_follows_a_changed_order() -> None:
@@ -48,6 +54,7 @@ def test_decoder_matches_by_name_and_follows_a_changed_order() -> None:
     for names, values in ((["a", "b"], [1.0, 2.0]), (["b", "a"], [2.0, 1.0]), (["x", "b", "a"], [9.0, 2.0, 1.0])):
         data = serialize_message(JointState(name=names, position=values))
         assert decoder.decode(data)[1] == (1.0, 2.0)
+        np.testing.assert_array_equal(decoder.decode_array(data)[1], [1.0, 2.0])
 
 
 @pytest.mark.parametrize("joint", [JointState(name=["a"], position=[1.0]), JointState(name=["a", "b"], position=[1.0])])

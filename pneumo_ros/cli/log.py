@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from pneumo_ros.session.repair import Recovery
     from pneumo_ros.session.salvage import Salvaged
 
-app = typer.Typer(help="Look into a session log, check, repair, export and compare.", no_args_is_help=True)
+app = typer.Typer(
+    add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
+)
 console = Console()
 
 LogPath = Annotated[Path, typer.Argument(help="Session log (.mcap) or a folder as `ros2 bag record` writes it.")]
@@ -109,6 +111,22 @@ def compare(
         _show_comparison(result)
 
 
+@app.command()
+def report(
+    log: LogPath,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Page to write (.html); beside the log by default.")
+    ] = None,
+) -> None:
+    """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
+    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.session.report import write_report
+
+    target = output or log.with_suffix(".html")
+    write_report(read_log(log), target)
+    console.print(f"report   {target}", highlight=False, soft_wrap=True)
+
+
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
     console.print(_topics_table(report.topics))
@@ -151,13 +169,23 @@ def _show_settings(report: Report) -> None:
         table.add_row("rig", key, f"{ours:g} (nominal {nominal:g})")
     for name, entries in report.metadata:
         for key, value in entries.items():
-            table.add_row(name, key, value if len(value) < 200 and "\n" not in value else f"({len(value)} characters)")
+            table.add_row(name, key, _short(value) if "\n" not in value else f"({len(value)} characters)")
+    before: dict[str, dict[str, object]] = {}
     for setup in report.setups:
-        for key, given in setup.parameters.items():
-            table.add_row(f"{setup.node} at {setup.time_ns / 1e9:.3f} s", str(key), str(given)[:200])
+        known = before.setdefault(setup.node, {})
+        new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
+        word = "changed" if known.keys() & new.keys() else "parameters"
+        known.update(new)
+        shown = ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != "")
+        table.add_row(f"{setup.node}, {setup.time_ns / 1e9:.3f} s", word, shown)
     for name, size in report.attachments:
         table.add_row("attachment", name, f"{size} bytes")
     console.print(table)
+
+
+def _short(value: object, limit: int = 120) -> str:
+    text = str(value)
+    return text if len(text) <= limit else f"{text[:limit]}... ({len(text)} characters)"
 
 
 def _show_events(report: Report) -> None:
@@ -206,13 +234,17 @@ def _show_comparison(result: Comparison) -> None:
     for name, (a, b) in result.counts.items():
         counts.add_row(name, str(a), str(b), "equal byte by byte" if name in result.identical else "differs")
     console.print(counts)
-    signals = Table(title="Signals", title_justify="left", box=SIMPLE_HEAD)
-    signals.add_column("topic and column", no_wrap=True)
-    for title in ("std, first", "std, second", "common", "rms difference", "largest"):
-        signals.add_column(title, justify="right")
+    signals = Table(title="Signals: std of each, difference at equal times", title_justify="left", box=SIMPLE_HEAD)
+    signals.add_column("topic, column", no_wrap=True)
+    for title in ("first", "second", "samples", "rms", "largest"):
+        signals.add_column(title, justify="right", no_wrap=True)
+    before = ""
     for s in result.signals:
-        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.4g}", f"{s.largest:.4g}"]
-        signals.add_row(f"{s.topic} {s.column}", *numbers)
+        if s.topic != before:
+            signals.add_row(s.topic)
+            before = s.topic
+        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.3g}", f"{s.largest:.3g}"]
+        signals.add_row(f"  {s.column}", *numbers)
     console.print(signals)
 
 

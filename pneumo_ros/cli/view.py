@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +17,9 @@ from rich.console import Console
 
 from pneumo_ros.errors import InputError
 
-app = typer.Typer(help="Show a session in the browser: a log played back, or a running session.")
+app = typer.Typer(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
 console = Console()
+END_PATIENCE = 5.0  # s a dashboard has to close its connections
 
 Host = Annotated[str, typer.Option(help="Address to serve on; anything but this computer needs the token it prints.")]
 Port = Annotated[int, typer.Option(help="Port; 0 takes a free one.", min=0, max=65535)]
@@ -64,6 +72,39 @@ def view_live(host: str, port: int, token: str | None, domain_id: int | None) ->
         dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)
         console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)
         dashboard.run()
+
+
+@contextmanager
+def beside(domain_id: int | None) -> Iterator[Viewer]:
+    """The live dashboard in a process of its own, so that drawing never holds up a node; ended on leaving."""
+    _need_bokeh()
+    domain = ["--domain-id", str(domain_id)] if domain_id is not None else []
+    environment = {**os.environ}
+    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pneumo_ros.cli.view", *domain], env=environment, start_new_session=True
+    )
+    try:
+        yield Viewer(process)
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(END_PATIENCE)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+@dataclass(frozen=True)
+class Viewer:
+    """The dashboard's process."""
+
+    process: subprocess.Popen[bytes]
+
+    def wait(self) -> None:
+        """Until the user has seen enough (Ctrl-C)."""
+        with suppress(KeyboardInterrupt):
+            self.process.wait()
 
 
 def _keep(page: object) -> None:

@@ -25,12 +25,13 @@ from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
+from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR
-from pneumo_ros.session.timing import TimingRecord
+from pneumo_ros.session.timing import LoopTiming
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
@@ -54,6 +55,7 @@ COMMON: tuple[Parameter, ...] = (
 ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
+GAP_PERIODS = 10  # control periods without a sample after which estimator and controller begin afresh
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -96,12 +98,13 @@ class RigNode(Node):
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
+        if "daq" in str(self.values["session_nodes"]).split(","):
+            prefer_this_process()  # hardware does not wait for other programs
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
-        self.execution, self.interval = TimingRecord(), TimingRecord()
+        self.timing = LoopTiming()
         self._outgoing: list[tuple[Topic, Publisher]] = []
-        self._last_step = 0
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -195,18 +198,19 @@ class RigNode(Node):
         for _, made in self._outgoing:
             made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
 
+    def continues(self, stamp_ns: int, last_ns: int) -> bool:
+        """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
+        return 0 <= stamp_ns - last_ns <= GAP_PERIODS * self.period_ns
+
     # -- health ----------------------------------------------------------------------------------------------------
 
     def timed(self, start_ns: int) -> None:
-        """Account for one step that began at ``start_ns`` (monotonic)."""
-        if self._last_step:
-            self.interval.add((start_ns - self._last_step) * 1e-9)
-        self._last_step = start_ns
-        self.execution.add((time.monotonic_ns() - start_ns) * 1e-9)
+        """Account for one step that began at ``start_ns`` (monotonic) and ends now."""
+        self.timing.mark(start_ns, time.monotonic_ns())
 
     def health(self) -> dict[str, str]:
         """Key figures of /diagnostics; nodes add theirs."""
-        return {"steps": str(self.execution.count), **self.interval.summary("period"), **self.execution.summary("step")}
+        return self.timing.summary()
 
     def health_level(self) -> tuple[bytes, str]:
         """(level, message) of /diagnostics."""

@@ -6,10 +6,12 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
 from pneumo_ros.nodes.base import OK, RigNode
+from pneumo_ros.nodes.emergency_stop import EmergencyStop
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.plant.sensors import NoiseSource, read_channels, truth
@@ -26,6 +28,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("duration", 20.0, "s", "length of the session; 0 runs until stopped", 0.0, 86400.0, read_only=True),
     Parameter("seed", 1, "1", "seed of the sensor noise", 0, 2**31 - 1, read_only=True),
     Parameter("truth_every", 5, "1", "publish /sim/truth every so many periods", 1, 1000, read_only=True),
+    Parameter("clock_every", 5, "1", "publish /clock every so many periods (lockstep)", 1, 10, read_only=True),
     Parameter("report_progress", False, "", "print the simulated time on standard output", read_only=True),
 )
 
@@ -43,11 +46,12 @@ class PlantNode(RigNode):
         self.index = -1
         self.start_ns = START_NS
         self.road = np.zeros((2, 2))
-        self._commands: dict[int, tuple[float, ...]] = {}
-        self._roads: dict[int, tuple[float, ...]] = {}
+        self._commands: dict[int, NDArray[np.float64]] = {}
+        self._roads: dict[int, NDArray[np.float64]] = {}
         self._deadlines: Deadlines | None = None
         self._next_progress = 0.0
         self._make_topics()
+        self.estop = EmergencyStop(self)
         # Load the compiled code now: the first period of a real-time session is as short as the others.
         self.car.advance(self.state, self.command, self.road, 1e-3)
         truth(self.car, self.state, self.command, self.road[1])
@@ -61,8 +65,8 @@ class PlantNode(RigNode):
         self._publish_truth = self.publisher(topics.TRUTH).publish
         self._send_clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
-        self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
-        self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode
+        self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode_array
+        self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode_array
         self.subscribe(topics.COMMAND, self._on_command)
         self.subscribe(topics.ROAD, self._on_road)
         self._others_ready: set[str] = set()
@@ -110,7 +114,7 @@ class PlantNode(RigNode):
         if areas is None or heights is None or self.index < 0 or self.stop.set:
             return
         start = time.monotonic_ns()
-        self.command[:] = areas
+        self.command[:] = self.estop.applied(areas)
         self.road[0] = self._roads.pop(self.stamp(self.index), heights)
         self.road[1] = heights
         self._step()
@@ -124,7 +128,7 @@ class PlantNode(RigNode):
         if deadlines is None or not deadlines.due(start) or self.stop.set:
             return
         for areas in self._commands.values():
-            self.command[:] = areas
+            self.command[:] = self.estop.applied(areas)
         # Skipped periods are simulated, so that the rig keeps pace with the clock; nobody measures in them.
         for _ in range(deadlines.advance(start)):
             self._pass_road()
@@ -155,7 +159,7 @@ class PlantNode(RigNode):
         noise = self.noise.next()
         exact = read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm)
         values = [e + n for e, n in zip(exact, noise, strict=True)]
-        if self._send_clock is not None:
+        if self._send_clock is not None and self.index % self.values["clock_every"] == 0:
             self._send_clock(encode_clock(stamp))
         self._send_measurement[0](self._displacement.encode(stamp, values[:4]))
         self._send_measurement[1](self._pressures[0].encode(stamp, values[4]))

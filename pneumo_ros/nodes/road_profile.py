@@ -1,4 +1,4 @@
-"""Publish the road under both axles, one period ahead of the clock, so that a period's end is known when it starts."""
+"""Publish the road under both axles ahead of the clock, so that a period's end is known when it starts."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from pneumo_ros.session import topics
 from pneumo_ros.session.cdr import JointEncoder, stamp_of
 
 BLOCK = 1024  # samples computed at once
+LEAD = 16  # samples ahead of the clock, which ticks every few periods only (plant: clock_every)
 
 
 class RoadProfileNode(RigNode):
@@ -44,7 +45,7 @@ class RoadProfileNode(RigNode):
         now = stamp_of(data)
         if self._start is None:
             self._start = now
-        index = round((now - self._start) / self.period_ns) + 1
+        index = round((now - self._start) / self.period_ns) + LEAD
         for i in range(self._sent + 1, index + 1):
             self._send(i)
         self._sent = max(self._sent, index)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import os
 import time
@@ -19,11 +18,10 @@ from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.cdr import stamp_of
 from pneumo_ros.session.provenance import versions
 from pneumo_ros.session.supervisor import END_REASON
-from pneumo_ros.session.topics import STRING, TOPICS, Topic
-from pneumo_ros.session.writing import Channel, LogWriter, Written
+from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, STRING, TOPICS, Topic
+from pneumo_ros.session.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 
 QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
 PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "every parameter change", "")
@@ -40,7 +38,6 @@ class SessionRecorderNode(RigNode):
         super().__init__("session_recorder", PARAMETERS, context=context, overrides=overrides)
         self.writer = LogWriter(Path(self.values["output"]), self._metadata())
         self.written: Written | None = None
-        self._latest = 0
         self._warned = False
         for topic in (*(t for t in TOPICS if t.recorded), PARAMETER_EVENTS):
             self._record(topic)
@@ -71,19 +68,10 @@ class SessionRecorderNode(RigNode):
         In lockstep a message is logged at its sample time, so that a session that ran at twenty times real time plays
         back as it was; the health topics carry the computer's time and go to the sample they came with.
         """
-        write = self.writer.write
-        if self.lockstep and stamped and channel.topic not in ("/rig/events", "/diagnostics"):
-
-            def at_sample_time(data: bytes) -> None:
-                self._latest = stamp = stamp_of(data)
-                write(channel, data, stamp, stamp)
-
-            return at_sample_time
-        return functools.partial(self._on_arrival, channel)
-
-    def _on_arrival(self, channel: Channel, data: bytes) -> None:
-        now = self._latest if self.lockstep else time.time_ns()
-        self.writer.write(channel, data, now, now)
+        if not self.lockstep:
+            return lambda data: self.writer.write(channel, data, time.time_ns())
+        at_stamp = stamped and channel.topic not in (EVENTS.name, DIAGNOSTIC.name)
+        return self.writer.taker(channel, AT_STAMP if at_stamp else AT_LATEST)
 
     def health_level(self) -> tuple[bytes, str]:
         """A warning once nothing is written any more."""
@@ -111,8 +99,8 @@ class SessionRecorderNode(RigNode):
         before, quiet_since = -1, time.monotonic()
         while time.monotonic() - quiet_since < QUIET_PERIOD:
             executor.spin_once(timeout_sec=0.02)
-            if self.writer.queued != before:
-                before, quiet_since = self.writer.queued, time.monotonic()
+            if self.writer.received != before:
+                before, quiet_since = self.writer.received, time.monotonic()
 
 
 def main(args: list[str] | None = None) -> int:

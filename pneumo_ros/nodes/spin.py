@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import time
@@ -74,6 +75,9 @@ def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = 
     executor = working_executor(nodes, context)
     for node in nodes:
         node.stop = stop
+    # What start-up made lives as long as the process: without this, a full collection stops the loop for 70 ms.
+    gc.collect()
+    gc.freeze()
     spin_once = executor.spin_once
     while not stop.set:
         spin_once(SPIN_TIMEOUT)

@@ -14,6 +14,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pneumo_ros.errors import InputError
 
 HEADER = b"\x00\x01\x00\x00"
@@ -44,6 +47,13 @@ class JointEncoder:
         self._template = body
         self._values = struct.Struct(f"<{len(names)}d")
         self._with_velocity = with_velocity
+
+    def encode_array(self, stamp_ns: int, position: NDArray[np.float64]) -> bytes:
+        """:meth:`encode` from a contiguous float64 array, without a Python float a value."""
+        body = self._template
+        STAMP.pack_into(body, len(HEADER), *divmod(stamp_ns, NANO))
+        body[self._position : self._position + self._values.size] = position.tobytes()
+        return bytes(body)
 
     def encode(self, stamp_ns: int, position: Sequence[float], velocity: Sequence[float] = ()) -> bytes:
         """One message: ``stamp_ns`` since the epoch, values in the order of the names."""
@@ -78,6 +88,15 @@ class JointDecoder:
         if self._order is not None:
             values = tuple(values[i] for i in self._order)
         return sec * NANO + nanosec, values
+
+    def decode_array(self, data: bytes) -> tuple[int, NDArray[np.float64]]:
+        """:meth:`decode` into a new array."""
+        start = len(self._prefix) + _AFTER_STAMP
+        if len(data) != self._length or data[_AFTER_STAMP:start] != self._prefix:
+            start = self._learn(data)
+        sec, nanosec = STAMP.unpack_from(data, len(HEADER))
+        values = np.frombuffer(data, np.float64, self._values.size // 8, _aligned(start))
+        return sec * NANO + nanosec, values.copy() if self._order is None else values[list(self._order)]
 
     def _learn(self, data: bytes) -> int:
         try:

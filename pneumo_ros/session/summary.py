@@ -53,12 +53,14 @@ class Summary:
     saturation : share of time each inlet is fully open or closed, front and rear
     area_error : rms of estimated minus true effective area, front and rear, m2; None on hardware
     loop : node -> key -> text of its last /diagnostics
+    speed : session time over wall time between first and last sample, 1 for real time; NaN if it was not logged
     """
 
     ride: Ride | None
     saturation: tuple[float, float]
     area_error: tuple[float, float] | None
     loop: dict[str, dict[str, str]]
+    speed: float
 
 
 def load_session(path: Path | str) -> Recorded:
@@ -84,15 +86,22 @@ def load_session(path: Path | str) -> Recorded:
                     *columns(topics.ROAD))  # fmt: skip
 
 
-def summarise(session: Recorded, loop: dict[str, dict[str, str]] | None = None) -> Summary:
-    """Figures of a session; the first :data:`SETTLED` seconds are left out."""
+def summarise(session: Recorded, loop: dict[str, dict[str, str]] | None = None, wall: float = float("nan")) -> Summary:
+    """Figures of a session; the first :data:`SETTLED` seconds are left out.
+
+    Parameters
+    ----------
+    loop : of :func:`loop_timing`
+    wall : of :func:`wall_time`, s
+    """
     command = session.command[session.time >= SETTLED]
     top = session.rig.inlet_area_max.value
     saturated = [
         float(np.mean((column <= NEAR_LIMIT * top) | (column >= (1.0 - NEAR_LIMIT) * top))) if len(column) else 0.0
         for column in command[:, :2].T
     ]
-    return Summary(_ride(session), (saturated[0], saturated[1]), area_error(session), loop or {})
+    return Summary(_ride(session), (saturated[0], saturated[1]), area_error(session), loop or {},
+                   float(session.time[-1]) / wall if len(session.time) else float("nan"))  # fmt: skip
 
 
 def area_error(session: Recorded) -> tuple[float, float] | None:
@@ -107,6 +116,18 @@ def area_error(session: Recorded) -> tuple[float, float] | None:
     ]
     front, rear = (float(np.sqrt(np.mean(e**2))) if len(e) else float("nan") for e in errors)
     return front, rear
+
+
+def ride_rows(ride: Ride) -> list[tuple[str, str, list[float], str]]:
+    """(name, unit, values, format) of every figure of a ride, for tables."""
+    return [
+        ("heave accel., rms", "m/s2", [ride.heave_rms], "%.3f"),
+        ("same, full scale", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
+        ("pitch accel., rms", "rad/s2", [ride.pitch_rms], "%.3f"),
+        ("mean personal rating", "0-5", [ride.rating], "%.2f"),
+        ("tyre load variation, f / r", "%", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
+        ("travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
+    ]
 
 
 def static_tyre_loads(rig: Rig) -> tuple[float, float]:
@@ -142,6 +163,16 @@ def loop_timing(path: Path | str) -> dict[str, dict[str, str]]:
             if status.name.endswith(": loop"):
                 out[status.name.removesuffix(": loop")] = {v.key: v.value for v in status.values}
     return out
+
+
+def wall_time(path: Path | str) -> float:
+    """Seconds on the computer's clock between a session's first and last sample; NaN without both events."""
+    log = read_log(path, [topics.EVENTS.name])
+    stamps: dict[str, float] = {}
+    for _, message in log.messages(topics.EVENTS.name) if _has(log, topics.EVENTS) else ():
+        stamp = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+        stamps.update({v.value: stamp for status in message.status for v in status.values if v.key == "code"})
+    return stamps.get("session_complete", float("nan")) - stamps.get("session_started", float("nan"))
 
 
 def _has(log: Log, topic: topics.Topic) -> bool:

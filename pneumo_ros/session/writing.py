@@ -9,18 +9,19 @@ from __future__ import annotations
 import shutil
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.writer import CompressionType, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
+from pneumo_ros.session.cdr import stamp_of
+from pneumo_ros.session.chunks import ChunkedWriter
 
 CHUNK_BYTES = 192 * 1024  # the writer closes a chunk after the message that exceeds this; every one stays below 256 KiB
 FREE_BYTES_NEEDED = 64 * 1024 * 1024  # below this the file is finished while there is room for its index
@@ -28,6 +29,8 @@ DISK_CHECK_EVERY = 4096  # messages
 BATCH_PERIOD = 0.05  # s between batches of the writing thread
 ROSBAG2_VERSION = 9
 PROFILE = "ros2"
+AT_STAMP = -1  # as a log time: the message's own header.stamp
+AT_LATEST = -2  # as a log time: that of the message before it
 
 
 @lru_cache(maxsize=64)
@@ -37,15 +40,14 @@ def interface(type_name: str) -> tuple[str, str]:
     return store.generate_msgdef(type_name, ros_version=2)[0], store.hash_rihs01(type_name)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Channel:
-    """A topic in the file: what is known of it and how much was written."""
+    """A topic in the file."""
 
     topic: str
     type: str
     qos: list[dict[str, Any]]
     number: int
-    count: int = 0
 
 
 @dataclass
@@ -82,20 +84,17 @@ class LogWriter:
         self.part = path.with_name(path.name + ".part")
         _refuse_bad_target(path)
         self._channels: dict[str, Channel] = {}
+        self._schemas: dict[str, int] = {}
         self._stream = self.part.open("wb")
-        self._writer = Writer(
-            self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
-        )
-        self._writer.start(profile=PROFILE, library=f"pneumo_ros {__version__}")
+        self._writer = ChunkedWriter(self._stream, PROFILE, f"pneumo_ros {__version__}", CHUNK_BYTES)
         for name, values in (metadata or {}).items():
-            self._writer.add_metadata(name, dict(values))
-        self._stream.flush()
-        self._queue: deque[tuple[Channel, bytes, int, int]] = deque()
+            self._writer.add_metadata(name, values)
+        self._writer.flush()
+        self._queue: deque[tuple[Channel, bytes, int]] = deque()
         self._finishing = threading.Event()
         self._lock = threading.Lock()  # topics are registered by callbacks while the thread writes
-        self._start, self._end, self._total = 0, 0, 0
+        self._total = self._latest = 0
         self._stopped = ""
-        self.queued = 0
         self._thread = threading.Thread(target=self._drain, name="log-writer", daemon=True)
         self._thread.start()
 
@@ -113,18 +112,30 @@ class LogWriter:
     def _register(
         self, topic: str, type_name: str, definition: str, type_hash: str, offered: list[dict[str, Any]]
     ) -> Channel:
-        schema = self._writer.register_schema(type_name, "ros2msg", definition.encode())
-        number = self._writer.register_channel(
-            topic, "cdr", schema,
-            {"offered_qos_profiles": yaml.safe_dump(offered, sort_keys=False), "topic_type_hash": type_hash},
-        )  # fmt: skip
+        schema = self._schemas.get(type_name)
+        if schema is None:
+            schema = self._schemas[type_name] = self._writer.add_schema(type_name, "ros2msg", definition.encode())
+        described = {
+            "offered_qos_profiles": yaml.safe_dump(offered, sort_keys=False),
+            "topic_type_hash": type_hash,
+        }
+        number = self._writer.add_channel(topic, "cdr", schema, described)
         self._channels[topic] = Channel(topic, type_name, offered, number)
         return self._channels[topic]
 
-    def write(self, channel: Channel, data: bytes, log_ns: int, publish_ns: int) -> None:
-        """Queue one serialised message; never blocks."""
-        self.queued += 1
-        self._queue.append((channel, data, log_ns, publish_ns))
+    @property
+    def received(self) -> int:
+        """Messages taken so far, written or waiting."""
+        return self._total + len(self._queue)
+
+    def write(self, channel: Channel, data: bytes, log_ns: int = AT_STAMP) -> None:
+        """Queue one serialised message; never blocks. ``log_ns`` may be :data:`AT_STAMP` or :data:`AT_LATEST`."""
+        self._queue.append((channel, data, log_ns))
+
+    def taker(self, channel: Channel, log_ns: int) -> Callable[[bytes], None]:
+        """A callback that queues what it is given; the least that can be done with a message."""
+        append = self._queue.append
+        return lambda data: append((channel, data, log_ns))
 
     def finish(self, complete: bool = True, reason: str = "") -> Written:
         """Write what is queued, metadata and index, and give the file its name.
@@ -133,9 +144,16 @@ class LogWriter:
         """
         self._finishing.set()
         self._thread.join()
-        result = Written(self.path, {c.topic: c.count for c in self._channels.values()}, self._start, self._end,
-                         complete and not self._stopped, reason or self._stopped)  # fmt: skip
-        description = self._bag_description()
+        self._writer.flush()
+        counts = self._writer.counts
+        result = Written(
+            self.path,
+            {c.topic: counts[c.number] for c in self._channels.values()},
+            *self._writer.span_ns,
+            complete and not self._stopped,
+            reason or self._stopped,
+        )
+        description = self._bag_description(result)
         text = yaml.safe_dump(description, sort_keys=False)
         end = {"complete": str(result.complete).lower(), "reason": result.reason}
         self._writer.add_metadata("session", end)
@@ -154,31 +172,35 @@ class LogWriter:
         self._write_queued()
 
     def _write_queued(self) -> None:
-        while self._queue:
-            channel, data, log_ns, publish_ns = self._queue.popleft()
-            if self._stopped:
-                continue
-            try:
-                if self._total % DISK_CHECK_EVERY == 0:
+        queue, add = self._queue, self._writer.add_message
+        with self._lock:
+            while queue:
+                channel, data, log_ns = queue.popleft()
+                self._total += 1
+                if log_ns == AT_STAMP:
+                    log_ns = stamp_of(data)
+                elif log_ns == AT_LATEST:
+                    log_ns = self._latest
+                self._latest = log_ns
+                if self._total % DISK_CHECK_EVERY == 1:
                     self._check_disk()
-                with self._lock:
-                    self._writer.add_message(channel.number, log_ns, data, publish_ns, channel.count)
-            except OSError as error:
-                self._stopped = f"the file system refused to write ({error})"
-                continue
-            channel.count += 1
-            self._total += 1
-            self._start = log_ns if self._total == 1 else min(self._start, log_ns)
-            self._end = max(self._end, log_ns)
+                if self._stopped:
+                    continue
+                try:
+                    add(channel.number, log_ns, data, log_ns)
+                except OSError as error:
+                    self._stopped = f"the file system refused to write ({error})"
 
     def _check_disk(self) -> None:
         free = shutil.disk_usage(self.path.parent).free
         if free < FREE_BYTES_NEEDED:
             self._stopped = f"disk nearly full ({free / 1e6:.0f} MB left); the log ends here, control goes on"
 
-    def _bag_description(self) -> dict[str, Any]:
+    def _bag_description(self, written: Written) -> dict[str, Any]:
         """rosbag2's metadata.yaml, version 9."""
-        start, duration = {"nanoseconds_since_epoch": self._start}, {"nanoseconds": self._end - self._start}
+        start = {"nanoseconds_since_epoch": written.start_ns}
+        duration = {"nanoseconds": written.end_ns - written.start_ns}
+        total = sum(written.counts.values())
         topics = [
             {
                 "topic_metadata": {
@@ -188,7 +210,7 @@ class LogWriter:
                     "offered_qos_profiles": c.qos,
                     "type_description_hash": interface(c.type)[1],
                 },
-                "message_count": c.count,
+                "message_count": written.counts[c.topic],
             }
             for c in self._channels.values()
         ]
@@ -197,14 +219,12 @@ class LogWriter:
             "storage_identifier": "mcap",
             "duration": duration,
             "starting_time": start,
-            "message_count": self._total,
+            "message_count": total,
             "topics_with_message_count": topics,
             "compression_format": "",
             "compression_mode": "",
             "relative_file_paths": [self.path.name],
-            "files": [
-                {"path": self.path.name, "starting_time": start, "duration": duration, "message_count": self._total}
-            ],
+            "files": [{"path": self.path.name, "starting_time": start, "duration": duration, "message_count": total}],
             "custom_data": None,
             "ros_distro": "jazzy",
         }

@@ -12,6 +12,7 @@ from bokeh.layouts import column, gridplot, row
 from bokeh.models import (
     Button,
     ColumnDataSource,
+    CustomJS,
     DataTable,
     Div,
     Range1d,
@@ -32,6 +33,8 @@ POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
 EVENTS_SHOWN = 200
 ANSWERS_SHOWN = 6
+IN_FLIGHT = 2  # pictures a slow browser may lag behind before the next is held back: its buttons must keep working
+PATIENCE = 1.0  # s
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "5", "10")
 _COLOURS = {"playing": "#2a7", "live": "#2a7", "paused": "#777", "waiting": "#c80", "ended": "#36c"}
 _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
@@ -52,6 +55,9 @@ class Page:
         self._answers = Div(text="", name="answers")
         self._gains = column(name="gains")
         self._known: tuple[Control, ...] = ()
+        self._sent, self._sent_at = 0, 0.0
+        self._beat, self._echo = (Div(text="0", visible=False, name=name) for name in ("beat", "echo"))
+        self._beat.js_on_change("text", CustomJS(args={"echo": self._echo}, code="echo.text = cb_obj.text"))
         self._position: Slider | None = None
         self._play: Toggle | None = None
         document.title = f"pneumo: {source.title}"
@@ -65,7 +71,9 @@ class Page:
             toolbar_location=None,
         )  # fmt: skip
         bar = self._live_bar() if self._controls is not None else self._playback_bar()
-        return column(self._status, bar, plots, self._event_table(), sizing_mode="stretch_width")
+        return column(
+            self._status, bar, plots, self._event_table(), self._beat, self._echo, sizing_mode="stretch_width"
+        )
 
     def _plot(self, panel: Panel) -> Any:
         plot = figure(
@@ -104,7 +112,7 @@ class Page:
         assert isinstance(source, Playback)
         length = max((source.end_ns - source.start_ns) * 1e-9, 1e-3)
         self._play = play = Toggle(label="Play / pause", active=True, button_type="success", name="play", width=110)
-        play.on_change("active", lambda _, __, new: setattr(source, "playing", new))
+        play.on_change("active", lambda _, __, new: source.play(new))
         loop = Toggle(label="Loop", active=False, name="loop", width=70)
         loop.on_change("active", lambda _, __, new: setattr(source, "loop", new))
         speed = Select(title="", value="1", options=[(s, f"{s} x") for s in SPEEDS], width=80, name="speed")
@@ -164,12 +172,18 @@ class Page:
     def refresh(self) -> None:
         """Bring every plot and text up to date."""
         now = time.monotonic()
-        self._source.tick(now - self._last)
+        if int(self._echo.text) > 0:  # playback waits until the browser has drawn its first picture
+            self._source.tick(now - self._last)
         self._last = now
+        # Now and then one goes out all the same: what was sent before the browser listened is never echoed.
+        if self._sent - int(self._echo.text) >= IN_FLIGHT and now - self._sent_at < PATIENCE:
+            return
+        self._sent, self._sent_at = self._sent + 1, now
         status = self._source.status()
         shown = (status.now_ns - status.start_ns) * 1e-9
         self._document.hold("combine")
         try:
+            self._beat.text = str(self._sent)
             self._status.text = _status_text(self._source.title, status)
             self._refresh_plots(status.start_ns)
             end = max(shown, WINDOW)
@@ -205,7 +219,7 @@ class Page:
         self._event_count = len(events)
         newest = list(events)[: -EVENTS_SHOWN - 1 : -1]
         self._events.data = {
-            "time": [f"{(e.time_ns - start_ns) * 1e-9:.3f}" for e in newest],
+            "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" for e in newest],
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
             "source": [e.source for e in newest],
             "code": [e.code for e in newest],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import secrets
+import signal
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -72,13 +73,13 @@ class Dashboard:
     url: str
 
     def run(self) -> None:
-        """Serve until interrupted."""
-        try:
-            self.server.io_loop.start()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            self.close()
+        """Serve until SIGINT or SIGTERM."""
+        loop = self.server.io_loop
+        for number in (signal.SIGINT, signal.SIGTERM):
+            # Through the loop: an exception raised in the middle of a callback could be taken for that callback's own.
+            loop.asyncio_loop.add_signal_handler(number, loop.stop)
+        loop.start()
+        self.close()
 
     def close(self) -> None:
         """End every session and free the port."""

@@ -1,0 +1,107 @@
+"""Closed loop over the serial path for as long as you like: lost frames, stamps, and the ride beside the plant's own.
+
+``python bench/serial_loop.py [--duration 60] [--seed 1] [--calibration appendix_c_corrected]`` starts an emulated rig
+on a pseudo-terminal, drives it at 1 kHz sampling and 500 Hz control, and compares the ride with the same controller,
+road and plant in one compiled loop. Exit code 1 if a frame was lost, the ride is off by more than 5 %, or stamps by
+more than 1 ms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
+
+from serial_rig import PERIOD, Loop, SerialRig
+
+from pneumo_ros.comfort import rms
+from pneumo_ros.control.loop import close_loop
+from pneumo_ros.daq.priority import prefer_this_process
+from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.rig import load_rig
+from pneumo_ros.road import build_road
+
+START_UP = 1.0  # s after arming that are not judged: ramp and estimator
+
+
+def ride(states: np.ndarray, period: float) -> dict[str, float]:
+    """rms accelerations and spring travel of a run of plant states (N, 10)."""
+    rig = load_rig()
+    heave = np.diff(states[:, 4]) / period
+    pitch = np.diff(states[:, 5]) / period
+    front = states[:, 0] + rig.front_arm.value * states[:, 1] - states[:, 2]
+    rear = states[:, 0] - rig.rear_arm.value * states[:, 1] - states[:, 3]
+    return {
+        "heave acceleration rms (m/s2)": rms(heave),
+        "pitch acceleration rms (rad/s2)": rms(pitch),
+        "front height std (mm)": float(np.std(front)) * 1e3,
+        "rear height std (mm)": float(np.std(rear)) * 1e3,
+    }
+
+
+def reference(duration: float, seed: int, loop: Loop) -> dict[str, float]:
+    """The same loop without a line between: plant, noise, estimator and controller in lockstep."""
+    rig = load_rig()
+    car, _ = nominal_half_car(rig)
+    road = build_road({"seed": seed}, wheelbase=rig.wheelbase)
+    heights, _ = road.sample(np.arange(round(duration / PERIOD) + 1) * PERIOD)
+    run = close_loop(car, rig, loop.estimator, loop.controller, heights, seed=seed)
+    return ride(run.states[round(START_UP / PERIOD) :], PERIOD)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--duration", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--calibration", default="appendix_c_corrected")
+    parser.add_argument("--drift", type=float, default=100.0, help="ppm of the board's clock")
+    parser.add_argument("--adc-bits", type=int, default=16)
+    options = parser.parse_args()
+    loop = Loop()
+    wanted = reference(options.duration, options.seed, loop)
+    print(f"raised priority: {prefer_this_process()}")
+    arguments = ["--seed", str(options.seed), "--adc-bits", str(options.adc_bits)]
+    with tempfile.TemporaryDirectory() as folder:
+        faults = [f"drift:ppm={options.drift}"]
+        with SerialRig(Path(folder), faults, arguments, loop, options.calibration) as rig:
+            rig.arm()
+            time.sleep(options.duration)
+            core = rig.driver.core
+            trip, lost, dropped = core.trip, core.lost_frames, rig.driver.dropped_writes
+            latency = np.percentile(core.intake.latencies_ns, [50, 99]) / 1e3  # type: ignore[union-attr]
+        return report(rig, wanted, options, trip.message if trip else "", lost + dropped, latency)
+
+
+def report(
+    rig: SerialRig, wanted: dict[str, float], options: argparse.Namespace, trip: str, lost: int, latency: np.ndarray
+) -> int:
+    truth = rig.truth
+    armed = truth.when("state", "armed")
+    first, last = armed + START_UP * 1e9, armed + options.duration * 1e9
+    inside = (truth.time_ns > first) & (truth.time_ns < last)
+    found = ride(truth.states[inside], 1e-3)
+    errors = np.abs(truth.stamp_errors([m for m in rig.measurements if m.arrival_ns > armed + 5e9])) / 1e3
+    print(
+        f"samples {len(rig.measurements)}, lost or not sent {lost}, wrong values {truth.wrong_values(rig.measurements)}"
+    )
+    print(f"trip: {trip or 'none'}; board late p99 {np.percentile(truth.lateness_ns, 99) / 1e3:.0f} us, "
+          f"max {truth.lateness_ns.max() / 1e3:.0f} us")  # fmt: skip
+    p50, p99 = np.percentile(errors, [50, 99])
+    print(f"frame latency p50 {latency[0]:.0f} us, p99 {latency[1]:.0f} us")
+    print(f"stamp error 5 s after arming: p50 {p50:.0f} us, p99 {p99:.0f} us, max {errors.max():.0f} us")
+    worst = 0.0
+    for name, value in found.items():
+        ratio = value / wanted[name]
+        worst = max(worst, abs(ratio - 1.0))
+        print(f"{name:34s} serial {value:8.4f}  plant {wanted[name]:8.4f}  ratio {ratio:.4f}")
+    return 1 if trip or lost or worst > 0.05 or p99 > 1000.0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

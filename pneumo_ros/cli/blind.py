@@ -1,0 +1,152 @@
+"""`pneumo blind`: cases whose answer is withheld, made, diagnosed and scored by anyone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from pneumo_ros import __version__
+from pneumo_ros.errors import InputError
+
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
+)
+
+Folder = Annotated[Path, typer.Argument(help="Folder of the set: manifest.json, cases/, labels.json.")]
+Workers = Annotated[int, typer.Option(help="Local processes.", min=1)]
+Scheduler = Annotated[str, typer.Option(help="Dask scheduler, tcp://host:8786; its workers must see the folder.")]
+Only = Annotated[str, typer.Option(help="Only cases whose name contains this.")]
+
+
+@app.command()
+def make(
+    folder: Folder,
+    set_name: Annotated[str, typer.Option("--set", help="full (240 cases), dev, dev2, ci.")] = "dev",
+    workers: Workers = 1,
+    scheduler: Scheduler = "",
+    only: Only = "",
+) -> None:
+    """Draw the cases of a set, write their logs, seal their labels.
+
+    Finished cases are kept: the same command goes on after an interruption. A case takes about 10 s of one core.
+    """
+    from pneumo_ros.cli.blind_work import make_case
+    from pneumo_ros.twin.plan import plan
+
+    cases = [case for case in plan(set_name) if only in case.name]
+    items = [(case, str(folder)) for case in cases]
+    _run("making", make_case, items, [case.name for case in cases], workers, scheduler)
+    _seal(folder, set_name, [case.name for case in cases])
+
+
+@app.command()
+def diagnose(
+    folder: Folder,
+    output: Annotated[Path, typer.Option(help="Folder for the diagnoses; default FOLDER/diagnoses.")] = Path(),
+    workers: Workers = 1,
+    scheduler: Scheduler = "",
+    only: Only = "",
+) -> None:
+    """Run the diagnosis on every case of a set; it sees the logs and which effects to do without, nothing else."""
+    from pneumo_ros.cli.blind_work import diagnose_case
+
+    results = output if output != Path() else folder / "diagnoses"
+    entries = [entry for entry in read_manifest(folder)["cases"] if only in entry["name"]]
+    items = [(entry["name"], tuple(entry["withhold"]), str(folder), str(results)) for entry in entries]
+    _run("diagnosing", diagnose_case, items, [entry["name"] for entry in entries], workers, scheduler)
+
+
+@app.command()
+def score(
+    folder: Folder,
+    labels: Annotated[Path, typer.Option(help="The maker's labels; default FOLDER/labels.json.")] = Path(),
+    results: Annotated[Path, typer.Option(help="Folder of the diagnoses; default FOLDER/diagnoses.")] = Path(),
+    output: Annotated[Path, typer.Option(help="Markdown page to write; default FOLDER/results.md.")] = Path(),
+    expect: Annotated[Path, typer.Option(help="JSON of verdicts that must be kept; exit 1 if one changed.")] = Path(),
+) -> None:
+    """Open the answers, check their seals, score the diagnosis and four baselines."""
+    from pneumo_ros.twin.scoring.report import write_report
+    from pneumo_ros.twin.scoring.results import load_results
+    from pneumo_ros.twin.seal import opened
+
+    manifest = read_manifest(folder)
+    digests = {entry["name"]: entry["label_sha256"] for entry in manifest["cases"]}
+    answers = opened(labels if labels != Path() else folder / "labels.json", digests)
+    found = load_results(results if results != Path() else folder / "diagnoses", answers)
+    page = output if output != Path() else folder / "results.md"
+    summary = write_report(page, answers, found, manifest)
+    Console().print(summary)
+    if expect != Path():
+        _hold_to(expect, found)
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The public manifest of a set."""
+    path = folder / "manifest.json"
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read the manifest ({error})", where=path,
+                         remedy="make the set with `pneumo blind make`") from error  # fmt: skip
+
+
+def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int, scheduler: str) -> None:
+    from pneumo_ros.cli.blind_batch import run_all
+
+    by_item = dict(zip(items, names, strict=True))
+    failed = []
+    with _bar() as progress:
+        task = progress.add_task(what, total=len(items))
+        for item, error in run_all(work, items, workers, scheduler or None):
+            progress.advance(task)
+            if error:
+                failed.append(by_item[item])
+                progress.console.print(f"[red]{by_item[item]}[/red] {error}", highlight=False)
+    if failed:
+        raise InputError(f"{len(failed)} of {len(items)} cases failed", value=", ".join(sorted(failed)),
+                         remedy="run the same command again: finished cases are kept")  # fmt: skip
+
+
+def _seal(folder: Path, set_name: str, names: Sequence[str]) -> None:
+    """Write manifest.json and labels.json; what is sealed already keeps its seal, new cases are added."""
+    from pneumo_ros.twin.plan import plan, seed_of
+    from pneumo_ros.twin.seal import sealed
+
+    before = read_manifest(folder)["cases"] if (folder / "manifest.json").exists() else []
+    entries = json.loads((folder / "labels.json").read_text(encoding="utf-8")) if before else []
+    new = [name for name in names if name not in {entry["name"] for entry in before}]
+    labels = [json.loads((folder / "labels" / f"{name}.json").read_text(encoding="utf-8")) for name in new]
+    salted, digests = sealed(labels)
+    withheld = {case.name: list(case.withhold) for case in plan(set_name)}
+    added = [{"name": name, "withhold": withheld[name], "label_sha256": digests[name]} for name in new]
+    manifest = {"set": set_name, "seed": seed_of(set_name), "software": f"pneumo_ros {__version__}",
+                "cases": before + added}  # fmt: skip
+    for name, content in (("labels.json", entries + salted), ("manifest.json", manifest)):
+        part = folder / f"{name}.part"
+        part.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        part.rename(folder / name)
+
+
+def _hold_to(expect: Path, found: dict[str, Any]) -> None:
+    wanted: dict[str, str] = json.loads(expect.read_text(encoding="utf-8"))
+    changed = {name: (verdict, found[name].verdict if name in found else "missing")
+               for name, verdict in wanted.items() if name not in found or found[name].verdict != verdict}  # fmt: skip
+    for name, (before, now) in changed.items():
+        Console(stderr=True).print(f"{name}: verdict was {before}, is now {now}")
+    if changed:
+        raise typer.Exit(1)
+
+
+def _bar() -> Progress:
+    return Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+                    TimeRemainingColumn())  # fmt: skip
+
+
+if __name__ == "__main__":
+    app()

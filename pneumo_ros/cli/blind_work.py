@@ -1,0 +1,37 @@
+"""The two pieces of work of a blind check, as functions of plain values so that any process can run them."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+from pneumo_ros.twin.case import made
+from pneumo_ros.twin.plan import Planned
+
+
+def make_case(item: tuple[Planned, str]) -> None:
+    """Make one case below a folder: ``cases/<name>/`` and ``labels/<name>.json``."""
+    case, folder = item
+    made(case, Path(folder) / "cases", Path(folder) / "labels")
+
+
+def diagnose_case(item: tuple[str, tuple[str, ...], str, str]) -> None:
+    """Diagnose one case into ``<results>/<name>.json``; a finished one is kept."""
+    name, withhold, folder, results = item
+    target = Path(results) / f"{name}.json"
+    if target.exists():
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    began = time.perf_counter()
+    diagnosis = _diagnosis(Path(folder) / "cases" / name, withhold)
+    part = target.with_suffix(".part")
+    part.write_text(json.dumps({"diagnosis": diagnosis, "seconds": time.perf_counter() - began}, indent=1), "utf-8")
+    part.rename(target)
+
+
+def _diagnosis(case: Path, withhold: tuple[str, ...]) -> dict[str, object]:
+    from pneumo_ros.gap.run import diagnose_files
+
+    found = diagnose_files([case / "fit.mcap"], case / "holdout.mcap", edit=case / "edit.mcap", without=list(withhold))
+    return dict(found.to_json())

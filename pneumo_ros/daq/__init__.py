@@ -1,0 +1,1 @@
+"""The rig's data acquisition: serial protocol, calibration, device clock, safety, driver core and emulator; no ROS."""

@@ -1,0 +1,376 @@
+"""The driver without threads or ports: bytes and time in; commands, measurements and events out.
+
+Everything is decided here, so that every path can be tested step by step; :mod:`pneumo_ros.daq.driver` adds the port.
+All times are monotonic, ns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+
+from pneumo_ros.daq.actuation import SECOND, Actuation, Mode
+from pneumo_ros.daq.calibration import Calibration
+from pneumo_ros.daq.calibration_check import check_calibration
+from pneumo_ros.daq.findings import Findings
+from pneumo_ros.daq.frames import DeviceFault, DeviceState, Hello, HelloRequest, Sample, SampleFlag, Status, encode
+from pneumo_ros.daq.intake import Intake, Measurement
+from pneumo_ros.daq.reasons import Event, Finding, Level, Reason
+from pneumo_ros.daq.safety_config import SafetyConfig
+from pneumo_ros.daq.scaling import check_map, output_scale
+from pneumo_ros.daq.stream import StreamDecoder
+from pneumo_ros.errors import InputError
+from pneumo_ros.plant.air_spring import effective_area, load_surface
+from pneumo_ros.rig import Rig
+
+HELLO_EVERY = SECOND // 5  # between handshake attempts
+REFUSED_EVERY = 2 * SECOND  # between attempts after a refusal
+SILENT_FOR = SECOND // 2  # of silence after which the handshake starts again
+WINDOW = SECOND  # over which lost frames are judged
+MIN_WINDOW_FRAMES = 100
+COMPLAINT_EVERY = SECOND  # between events about refused commands
+
+
+class Phase(Enum):
+    """State of the link."""
+
+    CLOSED = "closed"
+    HANDSHAKE = "handshake"
+    RUNNING = "running"
+    REFUSED = "refused"
+
+
+class DriverCore:
+    """One rig's driver.
+
+    Parameters
+    ----------
+    safety, calibration, rig : configuration
+    send : writes bytes to the port without blocking
+    discard : throws away bytes that have not left the host yet
+    """
+
+    def __init__(
+        self,
+        safety: SafetyConfig,
+        calibration: Calibration,
+        rig: Rig,
+        send: Callable[[bytes], None],
+        discard: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.safety, self.calibration, self.rig = safety, calibration, rig
+        self._surface = load_surface()
+        effective_area(rig.design_height.value, 1e5, self._surface)  # loads the compiled code before it is urgent
+        self.phase = Phase.CLOSED
+        self.decoder = StreamDecoder()
+        self.actuation = Actuation(safety, send, discard)
+        self.findings = Findings()
+        self.intake: Intake | None = None
+        self.status: Status | None = None
+        self.last: Measurement | None = None
+        self.trip: Event | None = None
+        self._send = send
+        self._out: list[Measurement | Event] = []
+        self._nonce = 0
+        self._last_hello = 0
+        self._last_sample = 0
+        self._silent = False
+        self._window = (0, 0, 0)
+        self._last_complaint = -COMPLAINT_EVERY
+
+    @property
+    def mode(self) -> Mode:
+        """What the driver does with the valves."""
+        return self.actuation.mode
+
+    @property
+    def pending(self) -> bool:
+        """Whether there is something to drain."""
+        return bool(self._out)
+
+    def drain(self) -> list[Measurement | Event]:
+        """Measurements and events since the last call, in order."""
+        out, self._out = self._out, []
+        return out
+
+    # -- link ------------------------------------------------------------------------------------------------------
+
+    def opened(self, now: int) -> None:
+        """The port is open: shake hands."""
+        self.decoder.reset()
+        self._shake_hands(now)
+
+    def closed(self, why: str, now: int) -> None:
+        """The port is gone; never armed again by itself."""
+        if self.phase is Phase.CLOSED:
+            return
+        self._lose(Finding(Reason.LINK_LOST, "port", why), now)
+        self.phase = Phase.CLOSED
+        self.actuation.board(None)
+
+    def receive(self, data: bytes, now: int) -> None:
+        """Bytes from the board, complete at ``now``."""
+        for record in self.decoder.feed(data):
+            if isinstance(record, Sample):
+                self._on_sample(record, now)
+            elif isinstance(record, Status):
+                self._on_status(record, now)
+            elif isinstance(record, Hello):
+                self._on_hello(record, now)
+
+    def tick(self, now: int) -> None:
+        """Call every 2 ms or so: timeouts, handshakes, keep-alives."""
+        if self.phase is Phase.RUNNING:
+            self._watch_samples(now)
+            self._watch_frames(now)
+        elif self.phase is not Phase.CLOSED:
+            pause = HELLO_EVERY if self.phase is Phase.HANDSHAKE else REFUSED_EVERY
+            if now - self._last_hello >= pause:
+                self._shake_hands(now)
+        finding = self.actuation.tick(now)
+        if finding is not None:
+            self._make_safe(finding, now)
+
+    def _shake_hands(self, now: int) -> None:
+        self.phase = Phase.HANDSHAKE
+        self.actuation.board(None)
+        self._last_hello = now
+        self._nonce = self._nonce % 0xFFFFFFFF + 1
+        self._send(encode(HelloRequest(self._nonce)))
+
+    def _on_hello(self, hello: Hello, now: int) -> None:
+        known = self.intake.hello.boot_id if self.intake else hello.boot_id
+        if hello.boot_id != known and self.phase is Phase.RUNNING:
+            self._lose(Finding(Reason.BOARD_RESET, "board", f"boot {known} became {hello.boot_id}"), now)
+        if hello.nonce == 0:
+            self._shake_hands(now)
+        elif hello.nonce == self._nonce and self.phase is Phase.HANDSHAKE:
+            self._meet(hello, now)
+
+    def _meet(self, hello: Hello, now: int) -> None:
+        """The answer to our handshake: take the board or refuse it."""
+        try:
+            check_map(hello)
+            scale = output_scale(self.calibration, hello)
+            self._check_board(hello, scale.counts(self.safety.safe_command))
+        except InputError as error:
+            self.phase = Phase.REFUSED
+            self._finding_event(Finding(Reason.BOARD_REFUSED, "board", str(error)), now)
+            return
+        self.intake = Intake(hello, self.calibration, self.safety, self.rig, self._surface)
+        self.actuation.board(scale)
+        self.phase, self.status, self.last = Phase.RUNNING, None, None
+        self._last_sample, self._silent = now, False
+        self._window = (now, 0, 0)
+        self.findings.reset(now)
+        firmware = ".".join(map(str, hello.firmware))
+        values = {"serial_number": hello.serial_number, "firmware": firmware, "boot_id": str(hello.boot_id),
+                  "sample_period_us": str(hello.sample_period_us), "adc_bits": str(hello.adc_bits)}  # fmt: skip
+        self.event(Level.OK, Reason.LINK_OPEN, f"board {hello.serial_number}, firmware {firmware}", values, now)
+        self._say_doubts(hello, now)
+
+    def _check_board(self, hello: Hello, safe: tuple[int, ...]) -> None:
+        limit = round(self.safety.timeouts.firmware * 1e6)
+        if hello.watchdog_us + hello.sample_period_us > limit:
+            raise InputError(
+                "the board's watchdog is too slow", where=f"board {hello.serial_number}",
+                value=hello.watchdog_us + hello.sample_period_us, allowed=f"at most {limit} us with a sample period",
+                remedy="build the firmware with a shorter watchdog",
+            )  # fmt: skip
+        theirs = tuple(entry.safe for entry in hello.outputs)
+        if theirs != safe:
+            raise InputError(
+                "the board has another safe state than config/safety.yaml", where=f"board {hello.serial_number}",
+                value=theirs, allowed=str(safe), remedy="make safe_command and the firmware agree",
+            )  # fmt: skip
+
+    def _say_doubts(self, hello: Hello, now: int) -> None:
+        assert self.intake is not None
+        for doubt in check_calibration(self.calibration, hello, self.rig.ambient_pressure.value):
+            values = {"channel": doubt.channel, "finding": doubt.code, "calibration": self.calibration.name}
+            text = f"{doubt.channel}: {doubt.text}"
+            self.event(Level.WARN, Reason.CALIBRATION_DOUBTFUL, text, values, now)
+        for channel in self.intake.plausibility.unwatched:
+            text = f"a stuck {channel} cannot be told in time with {self.calibration.name}"
+            self.event(Level.WARN, Reason.CHANNEL_UNWATCHED, text, {"channel": channel}, now)
+
+    # -- samples ---------------------------------------------------------------------------------------------------
+
+    def _on_sample(self, sample: Sample, now: int) -> None:
+        if self.phase is not Phase.RUNNING or self.intake is None:
+            return
+        measurement, found = self.intake.take(sample, now)
+        self._last_sample, self._silent = now, False
+        self._follow_board(sample, now)
+        if self.intake.recent_loss > self.safety.plausibility.lost_at_once:
+            text = f"{self.intake.recent_loss:.0%} of the last frames lost"
+            found.append(Finding(Reason.FRAMES_LOST, "link", text))
+        for finding in found:
+            self._handle(finding, now)
+        if measurement is not None:
+            self.last = measurement
+            self._out.append(measurement)
+        elif not self.intake.in_step:
+            self._lose(Finding(Reason.BOARD_RESET, "board", "its samples do not continue the earlier ones"), now)
+            self._shake_hands(now)
+
+    def _follow_board(self, sample: Sample, now: int) -> None:
+        """Keep our mode and the board's state together."""
+        pressed, mode = bool(sample.flags & SampleFlag.ESTOP_PRESSED), self.mode
+        stopped = sample.state is DeviceState.ESTOP
+        if pressed or (stopped and mode not in (Mode.ESTOP, Mode.RESETTING)):
+            self.findings.seen(Finding(Reason.ESTOP, "board", "e-stop input pressed"), now)
+            if mode is not Mode.ESTOP:
+                self.estop("the board's e-stop" + (" input" if pressed else ""), now)
+        elif mode is Mode.ARMING and sample.state is DeviceState.ARMED:
+            self.actuation.armed(now)
+            self.trip = None
+            self.event(Level.OK, Reason.ARMED, "valves armed, safe command until the controller's first", {}, now)
+        elif mode is Mode.RESETTING and sample.state is DeviceState.SAFE:
+            self.actuation.reset_done()
+            self.event(Level.OK, Reason.ESTOP_RESET, "emergency stop reset; arm to go on", {}, now)
+        elif mode is Mode.ARMED and sample.state is DeviceState.SAFE:
+            self._make_safe(self._board_finding(), now)
+
+    def _board_finding(self) -> Finding:
+        fault = self.status.fault if self.status else DeviceFault.NONE
+        reason = {DeviceFault.WATCHDOG: Reason.BOARD_WATCHDOG, DeviceFault.CONVERTER: Reason.CONVERTER}.get(
+            fault, Reason.BOARD_DISARMED
+        )
+        return Finding(reason, "board", f"the board went safe by itself: {fault.name.lower()}")
+
+    def _on_status(self, status: Status, now: int) -> None:
+        self.status = status
+        if self.intake is None or self.phase is not Phase.RUNNING:
+            return
+        for sequence, sent in self.actuation.sent_ns:
+            if sequence == status.command_sequence:
+                self.intake.clock.add_receipt(status.command_us, sent)
+                return
+
+    def _watch_samples(self, now: int) -> None:
+        silence = now - self._last_sample
+        if silence > self.safety.timeouts.samples * SECOND and not self._silent:
+            self._silent = True
+            self._lose(Finding(Reason.SAMPLES_STALE, "board", f"no sample for {silence / 1e6:.1f} ms"), now)
+        if silence > SILENT_FOR:
+            self._shake_hands(now)
+
+    def _watch_frames(self, now: int) -> None:
+        """Trip when too many of a window's frames were lost or damaged."""
+        start, expected_before, bad_before = self._window
+        if self.intake is None or now - start < WINDOW:
+            return
+        expected = self.intake.samples + self.intake.lost
+        share_of = expected - expected_before
+        lost = self.lost_frames - bad_before
+        if expected_before and share_of >= MIN_WINDOW_FRAMES:
+            limit = self.safety.plausibility.lost_frames
+            if lost > limit * share_of:
+                self._handle(Finding(Reason.FRAMES_LOST, "link", f"{lost} of {share_of} frames lost in a second"), now)
+        self._window = (now, expected, self.lost_frames)
+
+    @property
+    def lost_frames(self) -> int:
+        """Samples that never came or came damaged, since the handshake."""
+        return self.intake.lost + self.intake.out_of_step if self.intake else 0
+
+    # -- operator and controller -----------------------------------------------------------------------------------
+
+    def command(self, areas: Sequence[float], stamp: int, now: int) -> None:
+        """A controller's command: m2 in the order of VALVES, computed for the sample of monotonic time ``stamp``."""
+        finding = self.actuation.command(areas, stamp, now)
+        if finding is None:
+            return
+        if finding.estop:
+            self._make_safe(finding, now)
+        elif now - self._last_complaint >= COMPLAINT_EVERY:
+            self._last_complaint = now
+            self._finding_event(finding._replace(level=Level.WARN), now)  # an error once the driver trips over it
+
+    def blockers(self, now: int) -> list[str]:
+        """Why the valves cannot be armed; empty if they can."""
+        if self.phase is not Phase.RUNNING or self.intake is None or self.last is None:
+            return [f"the link is {self.phase.value}, no samples"]
+        out = self.findings.recent(now, round(self.safety.arming.healthy_for * SECOND))
+        if self._silent:
+            out.append("the board is silent")
+        if not self.intake.clock.settled:
+            out.append("the device clock is not settled yet (0.5 s)")
+        if not all(self.last.valid):
+            out.append("a sensor cannot be believed")
+        supply = self.last.values[6]
+        if supply < self.safety.arming.supply_low:
+            out.append(f"supply pressure {supply:.4g} Pa is below {self.safety.arming.supply_low:.4g} Pa")
+        return out
+
+    def arm(self, now: int) -> list[str]:
+        """Start arming; returns why not."""
+        why = self.blockers(now)
+        if self.mode is not Mode.SAFE:
+            why.append(f"the driver is in mode {self.mode.value}")
+        if not why:
+            self.actuation.arm(now)
+        return why
+
+    def disarm(self, now: int) -> None:
+        """Safe command, by the operator's wish."""
+        if self.mode in (Mode.ARMED, Mode.ARMING):
+            self.actuation.make_safe(now)
+            self.event(Level.OK, Reason.DISARMED, "valves safe", {}, now)
+
+    def estop(self, source: str, now: int) -> None:
+        """Emergency stop, latched, from any mode and with any link."""
+        if self.mode is not Mode.ESTOP:
+            self._make_safe(Finding(Reason.ESTOP, source, f"emergency stop by {source}", estop=True), now)
+
+    def reset(self, now: int) -> list[str]:
+        """End an emergency stop; returns why not. Arming stays a separate step."""
+        if self.mode is not Mode.ESTOP:
+            return [f"there is no emergency stop to reset, mode is {self.mode.value}"]
+        why = self.blockers(now)
+        if not why:
+            self.actuation.reset_estop(now)
+        return why
+
+    def use(self, calibration: Calibration, now: int) -> None:
+        """Take another calibration (zero, span); refused while armed by the caller."""
+        self.calibration = calibration
+        if self.intake is not None:
+            self.intake.use(calibration)
+        self.event(Level.OK, Reason.CALIBRATION_CHANGED, f"calibration {calibration.name} changed", {}, now)
+
+    # -- reactions -------------------------------------------------------------------------------------------------
+
+    def _handle(self, finding: Finding, now: int) -> None:
+        if finding.level is not Level.ERROR:
+            self._finding_event(finding, now)
+            return
+        new = self.findings.seen(finding, now)
+        if self.mode in (Mode.ARMED, Mode.ARMING) or finding.estop:
+            if finding.estop and self.mode is Mode.ESTOP:
+                return
+            self._make_safe(finding, now)
+        elif new:
+            self._finding_event(finding._replace(level=Level.WARN), now)
+
+    def _lose(self, finding: Finding, now: int) -> None:
+        """The link broke in some way: a trip if armed, else an event."""
+        if self.mode in (Mode.ARMED, Mode.ARMING):
+            self._make_safe(finding, now)
+        else:
+            self._finding_event(finding._replace(level=Level.WARN), now)
+
+    def _make_safe(self, finding: Finding, now: int) -> None:
+        """The valves first, the word about it after."""
+        self.actuation.make_safe(now, estop=finding.estop)
+        self._finding_event(finding, now)
+        self.trip = self._out[-1] if isinstance(self._out[-1], Event) else None
+
+    def _finding_event(self, finding: Finding, now: int) -> None:
+        values = {"subject": finding.subject, "mode": self.mode.value}
+        self.event(finding.level, finding.reason, f"{finding.reason.value}: {finding.text}", values, now)
+
+    def event(self, level: Level, reason: Reason, message: str, values: dict[str, str], now: int) -> None:
+        """Report something."""
+        self._out.append(Event(level, reason, message, values, now))

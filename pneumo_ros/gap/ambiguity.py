@@ -1,0 +1,61 @@
+"""What this log cannot tell apart from the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pneumo_ros.gap.problem import Problem
+from pneumo_ros.gap.selection import Scored, Thresholds, standard_error
+from pneumo_ros.gap.verdict import Opinion, name_of
+
+SAME = 0.1  # relative difference of selection scores that is no difference
+ANGLE = 8.0  # degrees between the trajectories of two effects, nuisance parameters answered, below which they are alike
+
+
+def ambiguity_group(
+    problem: Problem, opinion: Opinion, finalists: Sequence[Scored], limits: Thresholds
+) -> tuple[str, ...]:
+    """Ids in the verdict's group, the verdict's first; empty for none and unknown.
+
+    A rival belongs to it when its own best fit does nearly what the verdict's does: its trajectory is within
+    :data:`ANGLE` of it (what it fails to explain, over what there was to explain) and the selection blocks do not tell
+    them apart (two standard errors, or :data:`SAME`).
+    """
+    if opinion.verdict in ("none", "unknown"):
+        return ()
+    chosen = opinion.chosen
+    names = [opinion.verdict]
+    for rival in finalists:
+        name = name_of(rival.fit.candidate)
+        if name in names or rival.size != chosen.size:
+            continue
+        undecided = rival.level - chosen.level <= max(2.0 * standard_error(rival, chosen), SAME * chosen.level)
+        if undecided and angle(problem, chosen, rival) < ANGLE:
+            names.append(name)
+    return tuple(names)
+
+
+def angle(problem: Problem, chosen: Scored, rival: Scored) -> float:
+    """Degrees between what the two structures add to what the nuisance parameters can do, from the rival's
+    shortfall.
+    """
+    difference = chosen.fit.residual - rival.fit.residual
+    rows = problem.fitted
+    whole = float(np.sum((chosen.fit.residual[rows] - _without(problem, chosen)[rows]) ** 2))
+    return float(np.degrees(np.arcsin(min(1.0, np.sqrt(np.sum(difference[rows] ** 2) / max(whole, 1e-12))))))
+
+
+def _without(problem: Problem, chosen: Scored) -> np.ndarray:
+    """Residual of the chosen structure with its effects taken away, the nuisance answer (linear) given."""
+    from pneumo_ros.gap.problem import Candidate
+
+    bare = problem.residual(Candidate(), chosen.fit.x[: problem.fixed])
+    J = chosen.fit.jacobian
+    if J is None:
+        return np.asarray(bare)
+    flat = J[:, :, : problem.fixed].reshape(-1, problem.fixed)
+    change = (bare - chosen.fit.residual).ravel()
+    answer = np.linalg.solve(flat.T @ flat + np.eye(problem.fixed), flat.T @ change)
+    return np.asarray(chosen.fit.residual + (change - flat @ answer).reshape(bare.shape))

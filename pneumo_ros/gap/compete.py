@@ -1,0 +1,191 @@
+"""The competition: nominal re-estimated, single effects, pairs; each fitted with every nuisance parameter free.
+
+Cheap screening first (:mod:`pneumo_ros.gap.screen`), short fits of what promises most, then the best to convergence,
+from several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on top of each
+leading single, where the first effect no longer hides it. Whenever the best fit so far is good enough to time the
+command's jumps by (:mod:`pneumo_ros.gap.events`), they are timed and the finalists fitted again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from pneumo_ros.gap.events import timed
+from pneumo_ros.gap.fit import Fit, fit
+from pneumo_ros.gap.problem import Candidate, Part, Problem
+from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials
+
+Progress = Callable[[float, str], None]  # share done 0..1, what is being done
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is fitted; more of each finds rarer combinations and costs time in proportion.
+
+    Attributes
+    ----------
+    singles : singles that get a short fit
+    finalists : singles fitted to convergence
+    leaders : finalists on top of which a second effect is sought
+    seconds : second effects tried on each leader
+    blind_pairs : pairs taken from the screening at the refit
+    pair_finalists : pairs fitted to convergence
+    short, long : iterations of a short and of a full fit
+    """
+
+    singles: int = 14
+    finalists: int = 6
+    leaders: int = 3
+    seconds: int = 4
+    blind_pairs: int = 4
+    pair_finalists: int = 4
+    short: int = 3
+    long: int = 8
+
+
+@dataclass
+class Contest:
+    """The state of a competition; ends as its result.
+
+    Attributes
+    ----------
+    problem : the problem as last timed
+    refit : the nominal structure re-estimated
+    singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
+    promised : screening of the singles at the refit, for the report
+    lost : labels of candidates whose fit diverged
+    """
+
+    problem: Problem
+    refit: Fit
+    effort: Effort
+    progress: Progress
+    singles: list[Fit] = field(default_factory=list)
+    pairs: list[Fit] = field(default_factory=list)
+    promised: list[Promise] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+
+    @property
+    def finalists(self) -> list[Fit]:
+        """Converged singles and pairs."""
+        return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
+
+    @property
+    def best(self) -> Fit:
+        """Lowest training cost of all."""
+        return min([self.refit, *self.finalists], key=lambda f: f.cost)
+
+
+def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Contest:
+    """Run the competition; ``progress`` is called with the share done."""
+    progress(0.0, "re-estimating the nominal model")
+    nominal = Candidate()
+    contest = Contest(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), effort, progress)
+    _time_jumps(contest)
+    _run_singles(contest)
+    _time_jumps(contest)
+    if pairs and contest.singles:
+        _run_pairs(contest)
+        _time_jumps(contest)
+    return contest
+
+
+def _time_jumps(contest: Contest) -> None:
+    """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
+    moved = timed(contest.problem, contest.best)
+    if moved is contest.problem:
+        return
+    contest.problem = moved
+    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.finalists]
+    contest.refit = fit(moved, Candidate(), contest.refit.x, contest.refit.jacobian)
+    singles, pairs = contest.effort.finalists, contest.effort.pair_finalists
+    done = len(contest.singles[:singles])
+    contest.singles = _by_cost(again[:done]) + contest.singles[singles:]
+    contest.pairs = _by_cost(again[done:]) + contest.pairs[pairs:]
+
+
+def _run_singles(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.05, "screening effects")
+    found = trials(problem, contest.refit, all_parts(problem))
+    contest.promised = promises(problem, contest.refit, found)
+    short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles), (0.1, 0.4))
+    ended = [_finish(problem, one, effort) for one in short[: effort.finalists]]
+    contest.singles = _by_cost(ended) + short[effort.finalists :]
+
+
+def _run_pairs(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.6, "screening pairs")
+    seen: set[frozenset[Part]] = set()
+
+    def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
+        fresh = [p for p in promised if frozenset((*base, *p.parts)) not in seen][:count]
+        seen.update(frozenset((*base, *p.parts)) for p in fresh)
+        return fresh
+
+    short: list[Fit] = []
+    for k, single in enumerate(contest.singles[: effort.leaders]):
+        leader = with_jacobian(problem, single)
+        part = leader.candidate.parts[0]
+        others = [p for p in all_parts(problem) if compatible((part, p))]
+        promised = promises(problem, leader, trials(problem, leader, others))
+        span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
+        short += _short_fits(contest, leader, unseen(promised, (part,), effort.seconds), span)
+    found = trials(problem, contest.refit, all_parts(problem))
+    blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
+    short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
+    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
+    contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+
+
+def _varied(promised: Sequence[Promise], count: int) -> list[Promise]:
+    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their
+    chance.
+    """
+    taken: list[Promise] = []
+    for promise in promised:
+        if sum(p.parts[0][0] == promise.parts[0][0] for p in taken) < 3:
+            taken.append(promise)
+    return taken[:count]
+
+
+def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
+    problem, out = contest.problem, []
+    for k, promise in enumerate(chosen):
+        candidate = Candidate((*base.candidate.parts, *promise.parts))
+        contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
+        values = [*problem.values(base.candidate, base.x), *promise.values]
+        start = problem.start(candidate, base.x[: problem.fixed], values)
+        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        if one.diverged:
+            contest.lost.append(candidate.label)
+        else:
+            out.append(one)
+    return _by_cost(out)
+
+
+def _finish(problem: Problem, short: Fit, effort: Effort) -> Fit:
+    """To convergence, from where the short fit ended and from its effect's other shapes; the best of them."""
+    best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
+    parameters = problem.effect_parameters(short.candidate)
+    if len(short.candidate.parts) > 1 or all(p.size for p in parameters):
+        return best
+    for values in start_values(parameters)[2:]:
+        kept = problem.values(best.candidate, best.x)
+        mixed = [k if p.size else v for v, k, p in zip(values, kept, parameters, strict=True)]
+        start = problem.start(short.candidate, best.x[: problem.fixed], mixed)
+        other = fit(problem, short.candidate, start, best.jacobian, iterations=effort.short)
+        if other.cost < best.cost - 1.0:
+            best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
+    return best
+
+
+def with_jacobian(problem: Problem, state: Fit) -> Fit:
+    """The fit with its sensitivities."""
+    return state if state.jacobian is not None else fit(problem, state.candidate, state.x, iterations=1)
+
+
+def _by_cost(fits: Iterable[Fit]) -> list[Fit]:
+    return sorted(fits, key=lambda f: f.cost)

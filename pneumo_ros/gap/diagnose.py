@@ -1,0 +1,342 @@
+"""The diagnosis from end to end: logs in, verdict with places, ranking and held-out gaps out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.gap.ambiguity import ambiguity_group
+from pneumo_ros.gap.compete import Contest, Effort, Progress, compete, with_jacobian
+from pneumo_ros.gap.diagnosis import Diagnosis, EditTest, Experiment, Gap, Ranked
+from pneumo_ros.gap.fit import Fit, fit, sensitivities
+from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, noise_floor, settle, total_gap
+from pneumo_ros.gap.model import Active, Array, Mask, Model
+from pneumo_ros.gap.places import effect_shares
+from pneumo_ros.gap.problem import Candidate, Problem
+from pneumo_ros.gap.selection import Scored, Thresholds, score, select
+from pneumo_ros.gap.uncertainty import covariance, effect_estimates, nuisance_estimates
+from pneumo_ros.gap.verdict import Calibration, Opinion, judge, name_of
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """What flexible corrections on top of a structure say about the places of what it leaves.
+
+    Attributes
+    ----------
+    shares : (place, share of the held-out residual), largest first
+    left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
+    mendable : the same once the right places get a flexible correction
+    flat : noise, tolerances and model form explain what is left
+    """
+
+    shares: tuple[tuple[str, float], ...]
+    left: float
+    mendable: float
+    flat: bool
+
+
+Locate = Callable[[Any, Sequence[Any], Any, Array, Sequence[Active]], Whereabouts]
+SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a diagnosis does.
+
+    Attributes
+    ----------
+    pairs : look for two effects as well
+    effort : how many candidates are fitted
+    limits : what counts as evidence
+    calibration : constants of the probabilities
+    locate : (model, fit logs, held-out log, nuisance, active) -> :class:`Whereabouts` of what that structure leaves
+    experiment : design the experiment that splits an ambiguity group
+    """
+
+    pairs: bool = True
+    effort: Effort = field(default_factory=Effort)
+    limits: Thresholds = field(default_factory=Thresholds)
+    calibration: Calibration = field(default_factory=Calibration)
+    locate: Locate | None = None
+    experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A structure on the held-out log."""
+
+    predicted: Array
+    channels: Array
+    total: float
+
+
+def diagnose(
+    model: Model,
+    fit_logs: Sequence[Any],
+    holdout: Any,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    edit: Any | None = None,
+) -> Diagnosis:
+    """Diagnose logs with a model.
+
+    Parameters
+    ----------
+    model : :class:`pneumo_ros.gap.rig_model.RigModel` for the half car
+    fit_logs : records to fit, see :class:`pneumo_ros.gap.model.Record`
+    holdout : record that nothing is fitted to
+    progress : called with the share done and what is being done
+    edit : a record of the rig after a known change, predicted without refitting
+    """
+    options = options or Options()
+    tell = progress or (lambda share, what: None)
+    notes: list[str] = []
+    contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
+    tell(0.9, "selecting and checking on the held-out log")
+    problem = contest.problem
+    refit = score(problem, contest.refit)
+    finalists = [score(problem, f) for f in contest.finalists]
+    chosen = select(refit, finalists, options.limits)
+    opinion = judge(refit, finalists, chosen, options.limits, options.calibration)
+    found = _report(problem, contest, opinion, refit, finalists, holdout, options, tell, notes, edit)
+    return _within_limits(found, [*fit_logs, holdout])
+
+
+def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
+    """What the logs' own limitations leave of the verdict."""
+    limitations = [(r.name, one) for r in records for one in getattr(r, "limitations", ())]
+    if not limitations:
+        return found
+    notes = (*found.notes, *dict.fromkeys(f"{name}: {one.text}" for name, one in limitations))
+    cap = min(one.cap for _, one in limitations)
+    blocked = any(getattr(r, "blocked", False) for r in records)
+    verdict = "not_testable" if blocked else found.verdict
+    return replace(found, verdict=verdict, probability=min(found.probability, cap), notes=notes)
+
+
+def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
+    """The last log's end becomes the held-out record (with an initial state of its own)."""
+    last = fit_logs[-1]
+    cut = int(len(last.measured) * SPLIT)
+    return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
+
+
+def held_out(model: Model, record: Any, nuisance: Array, active: Sequence[Active]) -> HeldOut:
+    """Prediction and gaps of a structure on a record from its measured initial state."""
+    predicted = free_run(model, record, nuisance, active)
+    channels = channel_gaps(record, predicted)
+    return HeldOut(predicted, channels, total_gap(channels))
+
+
+def _report(
+    problem: Problem,
+    contest: Contest,
+    opinion: Opinion,
+    refit: Scored,
+    finalists: Sequence[Scored],
+    holdout: Any,
+    options: Options,
+    tell: Progress,
+    notes: list[str],
+    edit: Any | None,
+) -> Diagnosis:
+    model = problem.model
+    everything = np.ones(len(problem.measured), dtype=bool)
+    base = _final(problem, contest.refit, everything)
+    best = base if opinion.chosen.size == 0 else _final(problem, opinion.chosen.fit, everything)
+    nominal_values = np.array([p.nominal for p in model.parameters])
+    runs = {"nominal": held_out(model, holdout, nominal_values, ()), "refit": _held(problem, base, holdout)}
+    runs["best"] = runs["refit"] if best is base else _held(problem, best, holdout)
+    tell(0.93, "ranking")
+    ranking = _ranking(problem, opinion, finalists, base, best, runs, holdout)
+    group = ambiguity_group(problem, opinion, finalists, options.limits)
+    nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
+    tell(0.95, "locating")
+    before, after = _whereabouts(problem, base, best, holdout, options)
+    location = _location(problem, opinion, holdout, nuisance, active, runs, before if best is base else after)
+    experiment = None
+    if options.experiment is not None and len(group) > 1:
+        tell(0.97, "designing the next experiment")
+        experiment = _next_experiment(problem, options, opinion, finalists, group, best)
+    notes += _notes(contest, best, problem)
+    cov = covariance(problem, best)
+    tell(1.0, "done")
+    return Diagnosis(
+        verdict=opinion.verdict,
+        probability=opinion.probability,
+        location=tuple(location),
+        ranking=tuple(ranking),
+        ambiguity_group=group,
+        gap=_gap(model, holdout, runs),
+        nuisance=nuisance_estimates(problem, best, cov),
+        active=active,
+        experiment=experiment,
+        edit=None if edit is None else edit_test(problem, edit, base, best),
+        notes=tuple(notes),
+        logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
+        evidence=_evidence(refit, opinion.chosen, runs, before, after),
+        trajectories=_trajectories(holdout, runs),
+    )
+
+
+def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
+    """Fitted once more on all blocks, with fresh sensitivities."""
+    again = fit(problem, one.candidate, one.x, one.jacobian, rows=rows, iterations=4)
+    return sensitivities(problem, again)
+
+
+def _held(problem: Problem, one: Fit, holdout: Any) -> HeldOut:
+    active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+    return held_out(problem.model, holdout, problem.nuisance(one.x), active)
+
+
+def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
+    floor = noise_floor(holdout)
+    table = {name: run.channels for name, run in runs.items()} | {"noise_floor": floor}
+    per_channel = {c: {name: float(v[k]) for name, v in table.items()} for k, c in enumerate(model.channels)}
+    totals = {name: run.total for name, run in runs.items()}
+    return Gap(totals["nominal"], totals["refit"], totals["best"], total_gap(floor), per_channel)
+
+
+def _ranking(
+    problem: Problem,
+    opinion: Opinion,
+    finalists: Sequence[Scored],
+    base: Fit,
+    best: Fit,
+    runs: Mapping[str, HeldOut],
+    holdout: Any,
+) -> list[Ranked]:
+    refit = runs["refit"]
+    out = [_plain(("none",), opinion.named[Candidate()], refit.total)]
+    if opinion.unknown > 1e-3:
+        out.append(_plain(("unknown",), opinion.unknown, refit.total))
+    for scored in finalists:
+        same = best is not base and scored.fit.candidate == best.candidate
+        one = best if same else with_jacobian(problem, scored.fit)
+        run = runs["best"] if same else _held(problem, one, holdout)
+        out.append(_ranked(problem, one, opinion.named[one.candidate], run, refit, holdout))
+    return sorted(out, key=lambda r: -r.probability)
+
+
+def _plain(effects: tuple[str, ...], probability: float, gap: float) -> Ranked:
+    return Ranked(effects, (), None, probability, {}, gap, 0.0, (0.0, 0.0))
+
+
+def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Any) -> Ranked:
+    parts = one.candidate.parts
+    estimates = effect_estimates(problem, one, covariance(problem, one))
+    notes = [f"{name} ended at its bound" for name, e in estimates.items() if e.at_bound]
+    notes += [f"{name} moves no output" for name, e in estimates.items() if e.moves_nothing]
+    if not np.all(np.isfinite(run.predicted)):
+        notes.append("unstable on the held-out log")
+    return Ranked(
+        effects=tuple(effect for effect, _ in parts),
+        sites=tuple(site for _, site in parts),
+        side=side_of(problem.model, one.candidate),
+        probability=probability,
+        parameters=estimates,
+        gap_after=run.total,
+        shrink=1.0 - run.total / refit.total,
+        shrink_ci90=bootstrap_shrink(holdout, refit.predicted, run.predicted),
+        notes=tuple(notes),
+    )
+
+
+def side_of(model: Model, candidate: Candidate) -> str | None:
+    """The side its effects share; both when they are at different ends; None where no effect has one."""
+    sides = {model.side(Active(effect, site, ())) for effect, site in candidate.parts} - {None}
+    if not sides:
+        return None
+    return sides.pop() if len(sides) == 1 else "both"
+
+
+def _whereabouts(
+    problem: Problem, base: Fit, best: Fit, holdout: Any, options: Options
+) -> tuple[Whereabouts | None, Whereabouts | None]:
+    """Of what the refit leaves, and of what the best named structure leaves."""
+    if options.locate is None:
+        return None, None
+    found = []
+    for one in (base, best) if best is not base else (base,):
+        active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+        found.append(options.locate(problem.model, problem.records, holdout, problem.nuisance(one.x), active))
+    return found[0], found[-1]
+
+
+def _location(
+    problem: Problem,
+    opinion: Opinion,
+    holdout: Any,
+    nuisance: Array,
+    active: Sequence[Active],
+    runs: Mapping[str, HeldOut],
+    left: Whereabouts | None,
+) -> list[tuple[str, float]]:
+    """A named effect's own places; else the places where a flexible correction helps."""
+    refit, best = runs["refit"].total, runs["best"].total
+    if opinion.verdict != "unknown" and active:
+        initial = settle(problem.model, holdout, nuisance, active)
+        return effect_shares(problem.model, holdout, nuisance, initial, active, max(0.0, 1.0 - best / refit))
+    return [] if left is None else list(left.shares)
+
+
+def _evidence(
+    refit: Scored, chosen: Scored, runs: Mapping[str, HeldOut], before: Whereabouts | None, after: Whereabouts | None
+) -> dict[str, float]:
+    """Numbers the verdict rests on."""
+    out = {"level_refit": refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    for name, one in (("refit", before), ("chosen", after)):
+        if one is not None:
+            out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
+    return out | {f"gap_{name}": run.total for name, run in runs.items()}
+
+
+def _next_experiment(
+    problem: Problem, options: Options, opinion: Opinion, finalists: Sequence[Scored], group: Sequence[str], best: Fit
+) -> Experiment | None:
+    """Split the verdict from its strongest rival."""
+    assert options.experiment is not None
+    rivals = [s for s in finalists if name_of(s.fit.candidate) in group and name_of(s.fit.candidate) != opinion.verdict]
+    if not rivals:
+        return None
+    return options.experiment(problem, best, min(rivals, key=lambda s: s.level).fit)
+
+
+def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:
+    notes = [f"{label}: the fit diverged, the candidate lost" for label in contest.lost]
+    low, high = problem.bounds(best.candidate)
+    for m, p in enumerate(problem.model.parameters):
+        if best.x[m] in (low[m], high[m]):
+            notes.append(f"{p.name} stands at the edge of its tolerance")
+    return notes
+
+
+def _trajectories(holdout: Any, runs: Mapping[str, HeldOut]) -> dict[str, Array]:
+    time = np.arange(len(holdout.measured)) * holdout.period
+    return {"time": time, "log": np.asarray(holdout.measured), **{name: run.predicted for name, run in runs.items()}}
+
+
+def edit_test(problem: Problem, edit: Any, base: Fit, best: Fit) -> EditTest:
+    """Predict a log of the rig after a known change: what the log's configuration states differently is applied to the
+    estimates as a factor; nothing is fitted again."""
+    model = problem.model
+    changes = getattr(model, "changes", None)
+    factors: dict[str, float] = {} if changes is None else changes(edit)
+    scale = np.array([factors.get(p.name, 1.0) for p in model.parameters])
+    nominal = np.array([p.nominal for p in model.parameters])
+    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
+    gaps = [
+        held_out(model, edit, nuisance * scale, effects).total
+        for nuisance, effects in (
+            (nominal, ()),
+            (problem.nuisance(base.x), ()),
+            (problem.nuisance(best.x), active),
+        )
+    ]
+    changed = {name: factor for name, factor in factors.items() if factor != 1.0}
+    return EditTest(edit.name, changed, *gaps)

@@ -1,0 +1,235 @@
+"""The result of a diagnosis and its file form (contract: diagnosis.json)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.gap.model import Active, Array
+
+ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of an effect with its standard deviation.
+
+    ``at_bound`` says that the fit ended at an end of the allowed range; ``moves_nothing`` that no output depends on it.
+    """
+
+    value: float
+    std: float
+    unit: str
+    at_bound: bool = False
+    moves_nothing: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Contract form, with the flags only where they are set."""
+        out: dict[str, Any] = {"value": self.value, "std": self.std, "unit": self.unit}
+        if self.at_bound:
+            out["at_bound"] = True
+        if self.moves_nothing:
+            out["moves_nothing"] = True
+        return out
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One structure of the ranking.
+
+    Attributes
+    ----------
+    effects : ids; ("none",) for the nominal structure, ("unknown",) for what the library lacks
+    sites : site of each effect
+    side : "front", "rear", "both" or None
+    probability : 0..1, the list sums to one
+    parameters : by name (prefixed with the effect's id where two effects share a name)
+    gap_after : held-out gap with it
+    shrink : 1 - gap_after / gap of the refit
+    shrink_ci90 : moving-block bootstrap
+    notes : what counts against it
+    """
+
+    effects: tuple[str, ...]
+    sites: tuple[str, ...]
+    side: str | None
+    probability: float
+    parameters: Mapping[str, Estimate]
+    gap_after: float
+    shrink: float
+    shrink_ci90: tuple[float, float]
+    notes: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Contract form."""
+        return {
+            "effects": list(self.effects),
+            "side": self.side,
+            "sites": list(self.sites),
+            "probability": self.probability,
+            "parameters": {name: estimate.to_json() for name, estimate in self.parameters.items()},
+            "gap_after": self.gap_after,
+            "shrink": self.shrink,
+            "shrink_ci90": list(self.shrink_ci90),
+            "notes": list(self.notes),
+        }
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Held-out gaps: total and per channel."""
+
+    nominal: float
+    refit: float
+    best: float
+    noise_floor: float
+    per_channel: Mapping[str, Mapping[str, float]]
+
+    def to_json(self) -> dict[str, Any]:
+        """Contract form."""
+        return {
+            "nominal": self.nominal,
+            "refit": self.refit,
+            "best": self.best,
+            "noise_floor": self.noise_floor,
+            "per_channel": {channel: dict(values) for channel, values in self.per_channel.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
+    apart.
+    """
+
+    name: str
+    description: str
+    separation: float  # rms difference of the rivals' outputs over the noise, nuisance parameters answered
+    separation_now: float  # the same on the log that was given
+    time: Array  # (N,) s
+    road: Array  # (N, 2) m
+    valves: Array  # (N, 4) m2
+
+    def write(self, folder: Path) -> list[Path]:
+        """The profile as two tables: a road that ``pneumo run --road`` plays, and the valves' openings."""
+        tables = {
+            ROAD_FILE: ("time_s,front_m,rear_m", self.road),
+            VALVE_FILE: ("time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2", self.valves),
+        }
+        for name, (header, columns) in tables.items():
+            part = folder / f"{name}.part"
+            np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
+            part.replace(folder / name)
+        return [folder / name for name in tables]
+
+    def to_json(self) -> dict[str, Any]:
+        """Without the profile, which has files of its own."""
+        return {
+            "text": f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)",
+            "file": ROAD_FILE,
+            "name": self.name,
+            "description": self.description,
+            "separation": self.separation,
+            "separation_now": self.separation_now,
+        }
+
+
+@dataclass(frozen=True)
+class EditTest:
+    """A log with a known change, predicted without refitting."""
+
+    log: str
+    changes: Mapping[str, float]  # factor on each changed rig quantity
+    gap_nominal: float
+    gap_refit: float
+    gap_best: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain mapping."""
+        return {
+            "log": self.log,
+            "changes": dict(self.changes),
+            "gap_nominal": self.gap_nominal,
+            "gap_refit": self.gap_refit,
+            "gap_best": self.gap_best,
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Where the gap lies, which effect makes it, how far it shrinks.
+
+    Attributes
+    ----------
+    verdict : effect id, "<id>+<id>", "none", "unknown" or "not_testable"
+    probability : 0..1
+    location : places with their share of the gap, largest first
+    ranking : structures, most probable first
+    ambiguity_group : ids this log cannot tell from the verdict
+    gap : held-out gaps
+    nuisance : estimated parameters of the chosen structure, by name: value, std, unit
+    active : the chosen effects with their values
+    not_testable : effects that this excitation could not have shown, with the smallest size it could
+    notes : sentences for the reader: limitations, bounds reached, divergences
+    evidence : numbers the verdict rests on
+    trajectories : on the held-out rows: "time" (N,), "log", "nominal", "refit", "best" (N, C)
+    """
+
+    verdict: str
+    probability: float
+    location: tuple[tuple[str, float], ...]
+    ranking: tuple[Ranked, ...]
+    ambiguity_group: tuple[str, ...]
+    gap: Gap
+    nuisance: Mapping[str, Estimate]
+    active: tuple[Active, ...]
+    not_testable: Mapping[str, str] = field(default_factory=dict)
+    experiment: Experiment | None = None
+    edit: EditTest | None = None
+    notes: tuple[str, ...] = ()
+    logs: Mapping[str, Any] = field(default_factory=dict)
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    trajectories: Mapping[str, Array] = field(default_factory=dict, repr=False, compare=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """The contract's keys first, then what else was found; numbers that are not finite become null."""
+        out: dict[str, Any] = {
+            "verdict": self.verdict,
+            "probability": self.probability,
+            "location": [{"place": place, "share": share} for place, share in self.location],
+            "ranking": [entry.to_json() for entry in self.ranking],
+            "ambiguity_group": list(self.ambiguity_group),
+            "gap": self.gap.to_json(),
+            "nuisance": {name: estimate.to_json() for name, estimate in self.nuisance.items()},
+            "active": [{"effect": a.effect, "site": a.site, "values": list(a.values)} for a in self.active],
+            "not_testable": dict(self.not_testable),
+            "next_experiment": None if self.experiment is None else self.experiment.to_json(),
+            "edit_test": None if self.edit is None else self.edit.to_json(),
+            "notes": list(self.notes),
+            "evidence": dict(self.evidence),
+            "logs": dict(self.logs),
+        }
+        return dict(_finite(out))
+
+
+def write_json(diagnosis: Diagnosis, path: Path) -> None:
+    """Write diagnosis.json whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(diagnosis.to_json(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(v) for key, v in value.items()}
+    if isinstance(value, list):
+        return [_finite(v) for v in value]
+    if isinstance(value, float):
+        return float(f"{value:.6g}") if math.isfinite(value) else None
+    return value

@@ -1,0 +1,60 @@
+"""A mode of the bellows itself: part of its mass moves against the height and answers near its own frequency.
+
+q'' = w^2 (h - q) + 2 zeta w (h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (h' - q')): far below w the
+bellows follow the height and no force is left but m h''.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.gap.compose import PlantTerm
+from pneumo_ros.gap.effects.base import ENDS, Effect
+from pneumo_ros.gap.kernel_parts import Air, Strut, Tyre
+from pneumo_ros.gap.model import EffectParameter
+
+State = tuple[float, float]
+Values = tuple[float, float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
+    """The mode at rest on the strut."""
+    return (strut.height, strut.rate)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """Exact damped oscillation about the strut that moves at held speed."""
+    w, zeta = 2.0 * math.pi * p[1], p[2]
+    decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
+    # The strut's position at the state's instant, half a step back: the staggered scheme's second order.
+    e0 = z[0] - (strut.height - 0.5 * dt * strut.rate)
+    v0 = z[1] - strut.rate
+    c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
+    e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
+    v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
+    return (e1 + strut.height + 0.5 * dt * strut.rate, v1 + strut.rate)
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: State, p: Values) -> float:
+    """Inertia force of the mode on the strut."""
+    w = 2.0 * math.pi * p[1]
+    return -p[0] * (w * w * (strut.height - z[0]) + 2.0 * p[2] * w * (strut.rate - z[1]))
+
+
+EFFECT = Effect(
+    id="bellows_mode",
+    summary="a resonance of the bellows' own mass inside the strut",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True),
+        EffectParameter("mode_frequency", "Hz", 3.0, 80.0, 20.0, starts=(10.0, 40.0)),
+        EffectParameter("mode_damping_ratio", "1", 0.01, 0.5, 0.08),
+    ),
+    term=PlantTerm(states=2, start=start, advance=advance, force=force),
+)

@@ -1,0 +1,28 @@
+"""The road exciter follows its command as a second order lag, so that the tyre meets less road, later."""
+
+from __future__ import annotations
+
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.filters import lagged_line
+from pneumo_ros.gap.model import EffectParameter
+
+
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+    """Road heights that really act."""
+    road = inputs.road.copy()
+    for end in ends.columns:
+        road[:, end] = lagged_line(road[:, end], period, values[0], values[1])
+    return inputs._replace(road=road)
+
+
+EFFECT = Effect(
+    id="exciter_lag",
+    summary="the road exciter follows its command late",
+    sites=ENDS,
+    places=("road_input",),
+    parameters=(
+        EffectParameter("exciter_lag", "s", 0.0, 0.1, 0.005, size=True, starts=(0.015,)),
+        EffectParameter("exciter_damping_ratio", "1", 0.3, 2.0, 0.8),
+    ),
+    inputs=inputs,
+)

@@ -1,0 +1,87 @@
+"""Finding effects: the package's own, a user's file, or an installed entry point."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Iterable, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from pneumo_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from pneumo_ros.gap.effects.base import Effect
+
+ENTRY_POINT_GROUP = "pneumo_ros.effects"
+NOT_EFFECTS = {"base", "filters", "loading"}
+
+
+def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) -> dict[str, Effect]:
+    """All effects by id: the package's, those of installed entry points, then those in the given files.
+
+    Parameters
+    ----------
+    paths : Python files that define ``EFFECT``; an id that exists already is replaced by the user's
+    without : ids to leave out
+
+    Raises
+    ------
+    InputError
+        if a file cannot be loaded, defines no effect, or ``without`` names an unknown id.
+    """
+    package = str(Path(__file__).parent)
+    names = sorted(m.name for m in pkgutil.iter_modules([package]) if m.name not in NOT_EFFECTS)
+    found = [importlib.import_module(f"pneumo_ros.gap.effects.{name}").EFFECT for name in names]
+    found += [point.load() for point in entry_points(group=ENTRY_POINT_GROUP)]
+    found += [_effect_in(Path(path)) for path in paths]
+    library = {effect.id: effect for effect in found}
+    for name in without:
+        if name not in library:
+            raise InputError("unknown effect", key="without", value=name, allowed=", ".join(library))
+        del library[name]
+    return library
+
+
+def function_at(module: str, file: str, name: str) -> Any:
+    """A function of an importable module, or of a loose file that is loaded under that module name."""
+    try:
+        return getattr(importlib.import_module(module), name)
+    except ModuleNotFoundError:
+        return getattr(module_at(module, file), name)
+
+
+def module_at(module: str, file: str) -> ModuleType:
+    """Load a loose file once under a module name of its own."""
+    if module in sys.modules:
+        return sys.modules[module]
+    spec = importlib.util.spec_from_file_location(module, file)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"cannot load {file}")
+    loaded = importlib.util.module_from_spec(spec)
+    sys.modules[module] = loaded
+    try:
+        spec.loader.exec_module(loaded)
+    except BaseException:
+        del sys.modules[module]
+        raise
+    return loaded
+
+
+def _effect_in(path: Path) -> Effect:
+    from pneumo_ros.gap.effects.base import Effect
+
+    remedy = "give a Python file that defines EFFECT = Effect(...), like those in pneumo_ros/gap/effects"
+    try:
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+        effect = getattr(module_at(f"pneumo_effect_{path.stem}_{digest}", str(path.resolve())), "EFFECT", None)
+    except Exception as error:
+        raise InputError(f"cannot load the effect ({error})", where=path, remedy=remedy) from error
+    if not isinstance(effect, Effect):
+        raise InputError("defines no EFFECT", where=path, remedy=remedy)
+    return effect

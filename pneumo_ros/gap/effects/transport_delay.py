@@ -1,0 +1,26 @@
+"""Commands reach the valves late by a pure delay (bus, driver, line), any fraction of a sample."""
+
+from __future__ import annotations
+
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.filters import delayed_hold
+from pneumo_ros.gap.model import EffectParameter
+
+
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+    """Mean opening over each period, inlets and outlets of the given ends."""
+    commands = inputs.commands.copy()
+    for end in ends.columns:
+        for column in (end, 2 + end):
+            commands[:, column] = delayed_hold(commands[:, column], period, values[0])
+    return inputs._replace(commands=commands)
+
+
+EFFECT = Effect(
+    id="transport_delay",
+    summary="the valve command acts late by a pure delay",
+    sites=ENDS,
+    places=("{end}_air",),
+    parameters=(EffectParameter("delay", "s", 0.0, 0.2, 0.012, size=True, starts=(0.04,)),),
+    inputs=inputs,
+)

@@ -1,0 +1,29 @@
+"""The inlet valve follows its command as a second order lag: 1/((lag s)^2 + 2 damping lag s + 1)."""
+
+from __future__ import annotations
+
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.filters import lagged_hold
+from pneumo_ros.gap.model import EffectParameter
+
+
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+    """Mean opening over each period, inlets and outlets of the given ends."""
+    commands = inputs.commands.copy()
+    for end in ends.columns:
+        for column in (end, 2 + end):
+            commands[:, column] = lagged_hold(commands[:, column], period, values[0], values[1])
+    return inputs._replace(commands=commands)
+
+
+EFFECT = Effect(
+    id="valve_lag",
+    summary="the valve's opening follows its command late",
+    sites=ENDS,
+    places=("{end}_air",),
+    parameters=(
+        EffectParameter("valve_lag", "s", 0.0, 0.15, 0.012, size=True, starts=(0.04,)),
+        EffectParameter("valve_damping_ratio", "1", 0.3, 2.0, 0.8),
+    ),
+    inputs=inputs,
+)

@@ -1,0 +1,99 @@
+"""Hand-written pieces of the composed kernel: what a plant term sees, and the air balance with a sagging supply.
+
+The nominal equations are those of :mod:`pneumo_ros.plant.half_car`; here their intermediate quantities have names so
+that a term of an effect can use them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, outlet_flow, pressure_power
+from pneumo_ros.plant.half_car import Body
+from pneumo_ros.plant.orifice import clamped_flow_function
+from pneumo_ros.units import GAS_CONSTANT
+
+
+class Strut(NamedTuple):
+    """One air spring as a mechanical link.
+
+    height m, rate m/s (extension positive), gauge Pa, area m2 (effective, tolerance factor included),
+    force N (nominal, positive upwards on the body).
+    """
+
+    height: float
+    rate: float
+    gauge: float
+    area: float
+    force: float
+
+
+class Air(NamedTuple):
+    """The gas of one spring: pressure Pa absolute, height m, height rate m/s, volume m3, temperature K (Eq. 4.17),
+    inflow and outflow kg/s, exponent n, supply (stagnation) temperature K."""
+
+    pressure: float
+    height: float
+    rate: float
+    volume: float
+    temperature: float
+    inflow: float
+    outflow: float
+    exponent: float
+    supply_temperature: float
+
+
+class Tyre(NamedTuple):
+    """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle)."""
+
+    compression: float
+    rate: float
+    force: float
+
+
+@njit(cache=True, error_model="numpy")
+def strut_of(
+    height: float, rate: float, gauge: float, scale: float, damping: float, body: Body, surface: AreaSurface
+) -> Strut:
+    """The nominal spring with bushing and bump stop."""
+    area = scale * effective_area(height, gauge, surface)
+    stop = body.stop_stiffness * max(0.0, body.stop_height - height)
+    return Strut(height, rate, gauge, area, gauge * area - damping * rate + stop)
+
+
+@njit(cache=True, error_model="numpy")
+def air_of(
+    pressure: float,
+    height: float,
+    rate: float,
+    inlet: float,
+    outlet: float,
+    supply: float,
+    supply_power: float,
+    gas: Gas,
+) -> Air:
+    """Flows and temperature of one spring fed from ``supply`` (Pa absolute, with its (P_ref/supply)^k)."""
+    power = pressure_power(pressure, gas)
+    psi = clamped_flow_function(pressure / supply, power * supply_power, gas.k, gas.critical, gas.choked)
+    inflow = gas.inlet_scale * inlet * supply * psi / math.sqrt(GAS_CONSTANT * gas.supply_temperature)
+    return Air(
+        pressure,
+        height,
+        rate,
+        gas.volume_offset + gas.mean_area * height,
+        gas.supply_temperature * power,
+        inflow,
+        outlet_flow(outlet, pressure, power, gas),
+        gas.exponent,
+        gas.supply_temperature,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def air_rate(air: Air, mean_area: float) -> float:
+    """dP/dt of Eq. 4.22, Pa/s."""
+    heat = GAS_CONSTANT * air.temperature * (air.inflow - air.outflow)
+    return air.exponent * (heat - air.pressure * mean_area * air.rate) / air.volume

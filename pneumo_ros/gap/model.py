@@ -1,0 +1,128 @@
+"""What the diagnosis needs to know of any model: parameters, initial state, effects, and a prediction.
+
+Fitting, selection, ambiguity and verdict use nothing but these protocols, so that another rig (a frame on a shaker, an
+air chamber) is diagnosed by the same code; :mod:`pneumo_ros.gap.rig_model` is the half car's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A nuisance parameter: what the maker states and how well it is known.
+
+    ``std`` is one sigma of the prior in ``unit``; the fit stays inside ``nominal`` +-
+    :data:`~pneumo_ros.gap.fit.REACH` sigma.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    std: float
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """A parameter of an effect.
+
+    Attributes
+    ----------
+    name, unit : SI
+    low, high : bounds of the fit
+    typical : a size (or shape) worth trying first; also the scale of the fit
+    size : True for the parameter whose zero means "no effect"; False for one that shapes it
+    starts : further values to start the fit from
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    size: bool = False
+    starts: tuple[float, ...] = ()
+
+
+class EffectLike(Protocol):
+    """An unmodelled effect as the engine sees it."""
+
+    @property
+    def id(self) -> str: ...
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Where it may act: "front", "rear", "both", "" (the whole rig), or a channel."""
+
+    @property
+    def parameters(self) -> tuple[EffectParameter, ...]: ...
+
+
+@dataclass(frozen=True)
+class Active:
+    """An effect at a site with values of its parameters (in their order)."""
+
+    effect: str
+    site: str
+    values: tuple[float, ...]
+
+
+class Record(Protocol):
+    """A log on one time base: N rows, C channels."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def period(self) -> float:
+        """s between rows."""
+
+    @property
+    def measured(self) -> Array:
+        """(N, C), no NaN."""
+
+    @property
+    def weight(self) -> Array:
+        """(N, C), 0 where no sample is there."""
+
+    @property
+    def noise(self) -> Array:
+        """(C,) standard deviation of the sensor noise."""
+
+
+class Model(Protocol):
+    """A simulator with nuisance parameters and a library of effects."""
+
+    @property
+    def channels(self) -> tuple[str, ...]: ...
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
+
+    @property
+    def effects(self) -> Mapping[str, EffectLike]: ...
+
+    def initial(self, record: Any, active: Sequence[Active]) -> tuple[Array, Array]:
+        """Initial state (S,) from the record's first samples, seen through the active sensor effects, and its std
+        (S,).
+        """
+
+    def predict(
+        self, record: Any, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> Array:
+        """Free-running prediction of the measured channels, (rows or N, C); NaN after a divergence."""
+
+    def places(self, active: Active) -> tuple[str, ...]:
+        """Places of the rig that an effect at a site touches, first the one it is blamed on."""
+
+    def side(self, active: Active) -> str | None:
+        """ "front", "rear", "both", or None where sides make no sense."""

@@ -1,0 +1,328 @@
+"""What the report says, in the order a reader needs it; the template only lays it out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.gap.report.plots import Line, ladder, plot, scatter, shrink_bar
+from pneumo_ros.gap.report.rig_map import draw_map
+from pneumo_ros.gap.signals import MEASURED, Signals
+from pneumo_ros.gap.where import Law
+
+Array = NDArray[np.float64]
+
+ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
+SHOWN_CHANNELS = 2  # the rest is folded away
+SURE, LIKELY = 0.9, 0.6
+TITLES = {
+    "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
+    "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
+}  # fmt: skip
+UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything the report is made from.
+
+    Attributes
+    ----------
+    summary : the diagnosis file's mapping (contract), with whatever further keys it has
+    trajectories : "nominal", "refit" and "best" -> (N, 6) free runs on the held-out log
+    holdout : the held-out log
+    fit_names : names of the logs fitted
+    phrases : effect id -> what it is, in words
+    regimes : sentences on when the gap shows
+    conditional : subsystem -> gap when it is run alone
+    law : what is missing at the first place, as a curve
+    """
+
+    summary: Mapping[str, Any]
+    trajectories: Mapping[str, Array]
+    holdout: Signals
+    fit_names: Sequence[str]
+    phrases: Mapping[str, str] = field(default_factory=dict)
+    regimes: Sequence[str] = ()
+    conditional: Mapping[str, float] = field(default_factory=dict)
+    law: Law | None = None
+
+
+def contents(found: Findings) -> dict[str, Any]:
+    """Variables of the template."""
+    summary = found.summary
+    shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", [])}
+    charts = _charts(found)
+    return {
+        "title": f"Gap of {found.holdout.rig.name}",
+        "verdict": summary["verdict"],
+        "headline": headline(summary, found.phrases),
+        "confidence": confidence(summary),
+        "tone": _tone(summary),
+        "how_far": how_far(summary),
+        "map": draw_map(shares),
+        "places": [
+            {"name": place, "words": place_words(place), "share": share}
+            for place, share in shares.items()
+            if share >= 0.01
+        ],
+        "law": None if found.law is None else _law(found.law),
+        "ladder": ladder(_rungs(summary["gap"])),
+        "charts": charts[:SHOWN_CHANNELS],
+        "more_charts": charts[SHOWN_CHANNELS:],
+        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10]],
+        "parameters": _parameters(summary),
+        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items()],
+        "ambiguity": _ambiguity(summary, found.phrases),
+        "experiment": summary.get("next_experiment"),
+        "edit": _edit(summary),
+        "refused": _refused(summary),
+        "notes": [_sentence(note) for note in summary.get("notes", [])],
+        "limitations": [limit.text for limit in found.holdout.limitations],
+        "regimes": [_sentence(text) for text in found.regimes],
+        "conditional": [{"name": name.replace("_", " "), "gap": gap} for name, gap in found.conditional.items()],
+        "topics": found.holdout.topics,
+        "fit_names": list(found.fit_names),
+        "holdout_name": found.holdout.name,
+        "rig": found.holdout.rig.name,
+        "seconds": len(found.holdout.measured) * found.holdout.period,
+    }
+
+
+def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
+    """The verdict as a sentence."""
+    verdict = str(summary["verdict"])
+    if verdict == "none":
+        return "No unmodelled effect: the rig's own tolerances explain the log."
+    if verdict == "not_testable":
+        return "This log cannot tell: it did not excite the rig enough to show an effect."
+    if verdict == "unknown":
+        location = summary.get("location") or [{"place": "an unclear place"}]
+        return f"Something that no listed effect explains, at {place_words(location[0]['place'])}."
+    entry = _winner(summary)
+    sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
+    parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
+    return _sentence("; and ".join(parts))
+
+
+def confidence(summary: Mapping[str, Any]) -> str:
+    """How sure, in words and in per cent."""
+    p = float(summary["probability"])
+    word = "sure" if p >= SURE else "likely" if p >= LIKELY else "not sure"
+    return f"{word}: {100 * p:.0f} %"
+
+
+def how_far(summary: Mapping[str, Any]) -> str:
+    """What adding the effect does to the held-out gap, in a sentence."""
+    gap = summary["gap"]
+    if summary["verdict"] in ("none", "unknown", "not_testable") or not summary.get("ranking"):
+        return (
+            f"On the held-out log the nominal model is off by {gap['nominal']:.3g} of the signals' own size; "
+            f"parameters re-estimated inside their tolerances leave {gap['refit']:.3g}; sensor noise alone would be "
+            f"{gap['noise_floor']:.2g}."
+        )
+    best = _winner(summary)
+    low, high = best["shrink_ci90"]
+    return (
+        f"Adding it shrinks the held-out gap from {gap['refit']:.3g} (parameters re-estimated inside their tolerances) "
+        f"to {gap['best']:.2g}, by {_percent(best['shrink'])} (90 % interval {_percent(low)} to {_percent(high)}); "
+        f"sensor noise alone would leave {gap['noise_floor']:.2g}."
+    )
+
+
+def place_words(place: str) -> str:
+    """A contract place in words."""
+    if place.startswith("sensor:"):
+        return f"the sensor {place.removeprefix('sensor:').replace('_', ' ')}"
+    words = {
+        "body_heave": "the body (up and down)", "body_pitch": "the body (pitch)", "road_input": "the road input",
+        "supply": "the air supply",
+    }  # fmt: skip
+    end, _, part = place.partition("_")
+    parts = {"air": "air and valve", "force": "spring force"}
+    return words.get(place, f"the {end} {parts.get(part, part)}")
+
+
+def _winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
+    wanted = set(str(summary["verdict"]).split("+"))
+    ranking: Sequence[Mapping[str, Any]] = summary.get("ranking", [])
+    return next((entry for entry in ranking if set(entry["effects"]) == wanted), ranking[0])
+
+
+def _effect_words(effect: str, side: str | None, phrases: Mapping[str, str]) -> str:
+    what = phrases.get(effect, effect.replace("_", " "))
+    where = {"both": "at both ends", "front": "at the front", "rear": "at the rear"}.get(side or "")
+    if where is None:
+        return f"{what} ({side.replace('_', ' ')})" if side else what
+    return f"{where}, {what}"
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _percent(share: float) -> str:
+    """Whole per cent, with a digit more where 99.6 would read as 100."""
+    value = 100.0 * share
+    return f"{value:.1f} %" if 99.0 < value < 100.0 else f"{value:.0f} %"
+
+
+def _tone(summary: Mapping[str, Any]) -> str:
+    if summary["verdict"] in ("unknown", "not_testable") or float(summary["probability"]) < LIKELY:
+        return "open"
+    return "fine" if summary["verdict"] == "none" else "found"
+
+
+def _rungs(gap: Mapping[str, Any]) -> list[tuple[str, float, str]]:
+    return [
+        ("nominal model", float(gap["nominal"]), "nominal"),
+        ("parameters re-estimated", float(gap["refit"]), "refit"),
+        ("with the best explanation", float(gap["best"]), "best"),
+        ("sensor noise alone", float(gap["noise_floor"]), "floor"),
+    ]
+
+
+def _charts(found: Findings) -> list[dict[str, str]]:
+    """Overlay and residual of every usable channel, the one with the largest refitted gap first."""
+    log, runs = found.holdout, found.trajectories
+    errors = np.sqrt(np.mean(((log.measured - runs["refit"]) * log.weight / log.scale) ** 2, axis=0))
+    order = [int(c) for c in np.argsort(-errors) if log.usable[c]]
+    first, last = _zoom(log, runs["refit"])
+    return [_chart(found, c, first, last) for c in order]
+
+
+def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
+    log, name = found.holdout, MEASURED[c]
+    unit, factor = UNITS[name]
+    measured = np.where(log.weight[:, c] > 0, log.measured[:, c], np.nan) * factor
+    lines = [Line("log", "log", measured[first:last])]
+    lines += [Line(key, key, run[first:last, c] * factor) for key, run in found.trajectories.items() if key in _DRAWN]
+    left = [Line(key, key, measured - found.trajectories[key][:, c] * factor) for key in ("refit", "best")]
+    gaps = found.summary["gap"].get("per_channel", {}).get(name, {})
+    return {
+        "title": TITLES[name],
+        "name": name,
+        "overlay": plot(log.time[first:last], lines, unit),
+        "residual": plot(log.time, left, unit, height=120, band=2.0 * float(log.noise[c]) * factor),
+        "gaps": " → ".join(f"{gaps[key]:.3g}" for key in ("nominal", "refit", "best") if key in gaps)
+        if isinstance(gaps, Mapping)
+        else "",
+    }
+
+
+_DRAWN = ("nominal", "refit", "best")
+
+
+def _zoom(log: Signals, refit: Array) -> tuple[int, int]:
+    count = len(log.measured)
+    rows = min(count, round(ZOOM / log.period))
+    error = np.mean(((log.measured - refit) * log.weight / log.scale) ** 2, axis=1)
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    first = int(np.argmax(total[rows:] - total[:-rows])) if count > rows else 0
+    return first, first + rows
+
+
+def _sides(entry: Mapping[str, Any]) -> str:
+    sites = [site.replace("_", " ") for site in entry.get("sites", []) if site]
+    return ", ".join(dict.fromkeys(sites)) or str(entry.get("side") or "")
+
+
+def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str, Any]:
+    low, high = entry["shrink_ci90"]
+    return {
+        "name": " + ".join(entry["effects"]),
+        "side": _sides(entry),
+        "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
+        "probability": float(entry["probability"]),
+        "gap": float(entry["gap_after"]),
+        "shrink": _percent(entry["shrink"]),
+        "bar": shrink_bar(entry["shrink"], (low, high)),
+    }
+
+
+def _law(law: Law) -> dict[str, str]:
+    (x_unit, x_factor), (y_unit, y_factor) = readable(law.quantity_unit, law.x), readable(law.unit, law.y)
+    what = {"N": "missing force", "N m": "missing moment", "kg/s": "missing inflow"}[law.unit]
+    curve = (law.centres * x_factor, law.means * y_factor)
+    labels = (f"{law.quantity}, {x_unit}", f"{what}, {y_unit}")
+    return {
+        "plot": scatter(law.x * x_factor, law.y * y_factor, curve, labels),
+        "text": f"What the re-estimated model misses at {place_words(law.place)}, seen in the balance of the "
+        f"{law.equation.replace('_', ' ')}. Of all quantities, {law.quantity} explains most of it: "
+        f"{100 * law.explained:.0f} %.",
+    }
+
+
+def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    if not summary.get("ranking"):
+        return []
+    return [_quantity(name, value) for name, value in _winner(summary)["parameters"].items()]
+
+
+def _quantity(name: str, quantity: Mapping[str, Any]) -> dict[str, str]:
+    value, std = float(quantity["value"]), float(quantity.get("std") or 0.0)
+    unit, factor = readable(str(quantity.get("unit") or "1"), np.array([value]))
+    shown = "" if unit == "1" else unit
+    return {"name": name.replace("_", " "), "value": rounded(value * factor, std * factor), "unit": shown}
+
+
+_READABLE = {
+    "m": (("mm", 1e3, 0.5), ("µm", 1e6, 5e-4)), "m2": (("mm²", 1e6, 1e-2),), "m3": (("cm³", 1e6, 1e-2),),
+    "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 5e-3)),
+}  # fmt: skip
+
+
+def readable(unit: str, values: Array) -> tuple[str, float]:
+    """Unit and factor that make values of an SI unit easy to read: mm for millimetres, kPa for pressures."""
+    size = float(np.max(np.abs(values))) if len(values) else 0.0
+    found = (unit, 1.0)
+    for name, factor, below in _READABLE.get(unit, ()):
+        if 0.0 < size < below:
+            found = (name, factor)
+    return found
+
+
+def rounded(value: float, std: float) -> str:
+    """Value and standard deviation, the latter with two digits; four digits of the value without one."""
+    if not np.isfinite(std) or std <= 0.0:
+        return f"{value:.4g}"
+    digits = int(np.floor(np.log10(std))) - 1
+    if digits >= -6 and abs(value) < 1e6:
+        places = max(-digits, 0)
+        return f"{value:.{places}f} ± {std:.{places}f}"
+    power = int(np.floor(np.log10(max(abs(value), std))))
+    places = max(power - digits, 0)
+    return f"({value / 10.0**power:.{places}f} ± {std / 10.0**power:.{places}f})·10^{power}"
+
+
+def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[str]:
+    return [
+        f"{effect}: {phrases[effect]}" if effect in phrases else effect for effect in summary.get("ambiguity_group", [])
+    ]
+
+
+def _edit(summary: Mapping[str, Any]) -> str:
+    test = summary.get("edit_test")
+    if not test:
+        return ""
+    changes = ", ".join(f"{name.replace('_', ' ')} x {factor:.3g}" for name, factor in test["changes"].items())
+    return (
+        f"Predicted without refitting on {test['log']} ({changes or 'nothing changed'}): gap {test['gap_nominal']:.3g} "
+        f"nominal, {test['gap_refit']:.3g} re-estimated, {test['gap_best']:.3g} with the best explanation."
+    )
+
+
+def _refused(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Explanations that something counts against, and those that this log could not have shown."""
+    out = [
+        {"name": " + ".join(entry["effects"]), "side": entry.get("side") or "", "why": "; ".join(entry["notes"])}
+        for entry in summary.get("ranking", [])
+        if entry.get("notes")
+    ]
+    hidden: Mapping[str, str] = summary.get("not_testable") or {}
+    return out + [{"name": name, "side": "", "why": f"not testable here: {why}"} for name, why in hidden.items()]

@@ -1,0 +1,72 @@
+"""The files of a diagnosis: diagnosis.json for programs, report.html for people, residual.mcap for plotting tools."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.gap.diagnosis import Diagnosis, write_json
+from pneumo_ros.gap.report.contents import Findings
+from pneumo_ros.gap.report.page import write_report
+from pneumo_ros.gap.report.residual_log import write_residual_log
+from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.where import Location, conditional_gaps, habitat, locate, missing_law
+from pneumo_ros.gap.where.design import car_of
+
+FILES = ("diagnosis.json", "report.html", "residual.mcap")
+
+
+def write_outputs(
+    folder: Path,
+    diagnosis: Diagnosis,
+    model: RigModel,
+    fit: Sequence[Signals],
+    holdout: Signals,
+    location: Location | None = None,
+) -> list[Path]:
+    """Write all files of a diagnosis of the half car; older ones of the same names are replaced.
+
+    Parameters
+    ----------
+    folder : made if it is not there
+    fit, holdout : the logs that were fitted and held out
+    location : from :func:`pneumo_ros.gap.where.locate` on these logs, if it is at hand
+
+    Raises
+    ------
+    InputError
+        if the folder cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(diagnosis, folder / FILES[0])
+    except OSError as error:
+        raise InputError(
+            f"cannot write the diagnosis ({error})", where=folder, remedy="choose another folder"
+        ) from error
+    where = location or locate(model, fit, holdout)
+    write_report(folder / FILES[1], _findings(diagnosis, model, fit, holdout, where))
+    write_residual_log(folder / FILES[2], holdout, diagnosis.trajectories)
+    return [folder / name for name in FILES]
+
+
+def _findings(
+    diagnosis: Diagnosis, model: RigModel, fit: Sequence[Signals], holdout: Signals, where: Location
+) -> Findings:
+    runs = {name: run for name, run in diagnosis.trajectories.items() if name in ("nominal", "refit", "best")}
+    error = np.where(holdout.weight > 0, holdout.measured - runs["refit"], 0.0) / holdout.scale
+    telling = not where.flat and bool(where.shares)
+    return Findings(
+        summary=diagnosis.to_json(),
+        trajectories=runs,
+        holdout=holdout,
+        fit_names=[log.name for log in fit],
+        phrases={name: effect.summary for name, effect in model.library.items()},
+        regimes=[habitat(where, error).text] if telling else [],
+        conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),
+        law=missing_law(where, where.chosen[0] if where.chosen else None) if telling else None,
+    )

@@ -1,0 +1,327 @@
+"""The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
+kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pneumo_ros.gap.compose import CORRECTIONS, Compiled, Slot, compose
+from pneumo_ros.gap.effects.base import (
+    CHANNELS,
+    SENSOR_PLACES,
+    Effect,
+    Inputs,
+    Plant,
+    channels_of,
+    ends_of,
+)
+from pneumo_ros.gap.effects.loading import load_library
+from pneumo_ros.gap.model import Active, Array, Mask, Parameter
+from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
+from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
+from pneumo_ros.plant.trim import trim
+from pneumo_ros.rig import Rig
+
+if TYPE_CHECKING:
+    from pneumo_ros.gap.signals import Signals
+
+FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
+COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
+JUMP = 12.0  # medians of the command's change from row to row
+SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
+# The log stamps commands no finer than a sample and says nothing of the bus: a shift of all commands within a sample
+# is no effect.
+COMMAND_DELAY = "command_delay"
+COMMAND_DELAY_STD = 4e-4  # s
+_NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
+
+# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. The volume's
+# level and its slope over height are known equally well, and not by the same measurement: both are free (a common
+# factor would leave V/(dV/dh), hence the air's stiffness, exact).
+NUISANCE = {
+    "sprung_mass": "sprung_mass",
+    "pitch_inertia": "pitch_inertia",
+    "unsprung_mass_front": "unsprung_mass_front",
+    "unsprung_mass_rear": "unsprung_mass_rear",
+    "tyre_stiffness_front": "tyre_stiffness_front",
+    "tyre_stiffness_rear": "tyre_stiffness_rear",
+    "bushing_damping_front": "bushing_damping",
+    "bushing_damping_rear": "bushing_damping",
+    "supply_pressure": "supply_pressure",
+    "outlet_area_front": "outlet_area_front",
+    "outlet_area_rear": "outlet_area_rear",
+    "effective_area_scale_front": "effective_area_scale",
+    "effective_area_scale_rear": "effective_area_scale",
+    "volume_scale_front": "volume_scale",
+    "volume_scale_rear": "volume_scale",
+    "volume_slope_scale_front": "volume_scale",
+    "volume_slope_scale_rear": "volume_scale",
+    "discharge_coefficient_front": "discharge_coefficient",
+    "discharge_coefficient_rear": "discharge_coefficient",
+}
+
+
+@dataclass(frozen=True)
+class RigModel:
+    """A rig with a library of effects; implements :class:`pneumo_ros.gap.model.Model` for :class:`Signals`.
+
+    Attributes
+    ----------
+    rig : nominal values and tolerances
+    library : effects by id, all of them in the compiled kernel
+    withheld : ids that the competition does without (the kernel keeps them, so nothing is compiled anew)
+    step : longest RK4 step, s
+    """
+
+    rig: Rig
+    library: Mapping[str, Effect] = field(default_factory=load_library)
+    withheld: frozenset[str] = frozenset()
+    step: float = FIT_STEP
+    surface: AreaSurface = field(default_factory=load_surface)
+
+    channels = CHANNELS
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Nuisance parameters; a quantity without tolerance is exact and stays."""
+        found = []
+        for name, source in NUISANCE.items():
+            q = getattr(self.rig, source)
+            if q.std > 0.0:
+                found.append(Parameter(name, q.unit, q.value, q.std))
+        found.append(Parameter(COMMAND_DELAY, "s", 0.0, COMMAND_DELAY_STD))
+        return tuple(found)
+
+    @cached_property
+    def effects(self) -> Mapping[str, Effect]:
+        """The effects that compete."""
+        return {name: effect for name, effect in self.library.items() if name not in self.withheld}
+
+    def places(self, active: Active) -> tuple[str, ...]:
+        """Places touched, first the one blamed."""
+        effect = self.library[active.effect]
+        if effect.outputs is not None:
+            return tuple(SENSOR_PLACES[CHANNELS[channel]] for channel in channels_of(active.site))
+        ends = [end for end, on in zip(("front", "rear"), ends_of(active.site), strict=True) if on]
+        return tuple(dict.fromkeys(place.format(end=end) for place in effect.places for end in ends))
+
+    def side(self, active: Active) -> str | None:
+        """The end for an effect of an end; None for the whole rig and for sensors (their place names the channel)."""
+        on_an_end = self.library[active.effect].outputs is None and active.site in ("front", "rear", "both")
+        return active.site if on_an_end else None
+
+    def initial(self, record: Signals, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+        """State at the record's first row: the measured one, seen through the active sensor effects."""
+        state = np.asarray(record.initial, dtype=float)
+        channels, rates = _channels(state, self._base.body), _ends_rates(state, self._base.body)
+        for one in active:
+            effect = self.library[one.effect]
+            if effect.undo is not None:
+                channels = effect.undo(channels.reshape(1, -1), channels_of(one.site), one.values)[0]
+        body = self.plant(None, active).body
+        return _state(channels, rates, body), np.asarray(record.initial_std, dtype=float)
+
+    def predict(
+        self, record: Signals, nuisance: Array, initial: Array, active: Sequence[Active] = (), rows: int | None = None
+    ) -> Array:
+        """Predicted channels, (rows or N, 6)."""
+        return self.simulate(record, nuisance, initial, active, rows=rows)
+
+    def simulate(
+        self,
+        record: Signals,
+        nuisance: Array | None = None,
+        initial: Array | None = None,
+        active: Sequence[Active] = (),
+        correction: Array | None = None,
+        rows: int | None = None,
+    ) -> Array:
+        """Predicted channels with optional additive corrections (N, 9), columns CORRECTIONS, held over each period."""
+        states = self.states(record, nuisance, initial, active, correction, rows)
+        plant = self.plant(nuisance, active)
+        out = _channels(states, plant.body)
+        for one in active:
+            effect = self.library[one.effect]
+            if effect.outputs is not None:
+                out = effect.outputs(out, record.period, channels_of(one.site), one.values)
+        return out
+
+    def states(
+        self,
+        record: Signals,
+        nuisance: Array | None = None,
+        initial: Array | None = None,
+        active: Sequence[Active] = (),
+        correction: Array | None = None,
+        rows: int | None = None,
+    ) -> Array:
+        """States of :mod:`pneumo_ros.plant.half_car`, (rows or N, 10)."""
+        count = len(record.measured) if rows is None else rows
+        inputs = Inputs(record.commands[: count - 1], record.road[:count])
+        if nuisance is not None:
+            late = float(nuisance[[p.name for p in self.parameters].index(COMMAND_DELAY)])
+            inputs = inputs._replace(commands=_shifted(inputs.commands, late / record.period))
+        for one in active:
+            effect = self.library[one.effect]
+            if effect.inputs is not None:
+                inputs = effect.inputs(inputs, record.period, ends_of(one.site), one.values)
+        start = self.initial(record, active)[0] if initial is None else initial
+        plant = self.plant(nuisance, active)
+        steps = 1 if self.step < record.period <= COARSEST else substeps(record.period, self.step)
+        commands, road = np.ascontiguousarray(inputs.commands), np.ascontiguousarray(inputs.road)
+        terms = [one for one in active if self.library[one.effect].term is not None]
+        if not terms and correction is None:
+            return simulate(start, commands, road, record.period, steps, *plant, self.surface)
+        held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
+        on, values = self._switches(terms)
+        return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+
+    def coarse(self, record: Signals) -> Signals:
+        """Every other row, commands averaged in pairs: half the steps, true to 1 % of a sensitivity."""
+        rows = len(record.measured) // 2 * 2
+        return replace(
+            record,
+            period=2.0 * record.period,
+            measured=record.measured[:rows:2],
+            weight=record.weight[:rows:2],
+            commands=record.commands[:rows].reshape(-1, 2, 4).mean(axis=1),
+            road=record.road[:rows:2],
+        )
+
+    def changes(self, record: Signals) -> dict[str, float]:
+        """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
+        pairs = {name: (getattr(record.rig, q).value, getattr(self.rig, q).value) for name, q in NUISANCE.items()}
+        return {name: new / old for name, (new, old) in pairs.items() if old > 0.0 and new != old}
+
+    def events(self, record: Signals) -> list[tuple[int, int]]:
+        """Jumps of the inlet commands (row, column); none where the command moves all the time."""
+        found = []
+        for column in (0, 1):
+            steps = np.abs(np.diff(record.commands[:, column]))
+            limit = max(JUMP * float(np.median(steps)), 0.02 * float(np.ptp(record.commands[:, column])), 1e-12)
+            rows = np.flatnonzero(steps > limit) + 1
+            if len(rows) < SPARSE * len(steps):
+                found += [(int(row), column) for row in rows]
+        return found
+
+    def led(self, record: Signals, events: list[tuple[int, int]], lead: Array) -> Signals:
+        """The record with jumps ``lead`` samples earlier: the row before takes that share of the jump."""
+        commands = record.commands.copy()
+        for (row, column), share in zip(events, lead, strict=True):
+            commands[row - 1, column] += share * (record.commands[row, column] - record.commands[row - 1, column])
+        return replace(record, commands=commands)
+
+    def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
+        """Parameters of the nominal equations with nuisance values and the active parameter changes."""
+        v = {} if nuisance is None else dict(zip((p.name for p in self.parameters), map(float, nuisance), strict=True))
+        plant = _plant(self.rig, self._base, v)
+        for one in active:
+            effect = self.library[one.effect]
+            if effect.plant is not None:
+                plant = effect.plant(plant, ends_of(one.site), one.values)
+        return plant
+
+    @cached_property
+    def slots(self) -> tuple[Slot, ...]:
+        """Terms of the library in the kernel's order."""
+        return tuple(
+            Slot(e.id, e.term, len(e.parameters)) for _, e in sorted(self.library.items()) if e.term is not None
+        )
+
+    @cached_property
+    def kernel(self) -> Compiled:
+        """The library's compiled kernel."""
+        return _kernel(self.slots)
+
+    @cached_property
+    def _base(self) -> HalfCar:
+        return _base(self.rig, self.step)
+
+    def _switches(self, terms: Sequence[Active]) -> tuple[Mask, Array]:
+        slots = {slot.name: k for k, slot in enumerate(self.slots)}
+        on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
+        values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in self.slots)])))
+        for one in terms:
+            for end in ends_of(one.site).columns:
+                on[slots[one.effect], end] = True
+                values[slots[one.effect], end, : len(one.values)] = one.values
+        return on, values
+
+
+@lru_cache(maxsize=8)
+def _kernel(slots: tuple[Slot, ...]) -> Compiled:
+    return compose(slots)
+
+
+@lru_cache(maxsize=32)
+def _base(rig: Rig, step: float) -> HalfCar:
+    return half_car(rig, trim(rig).pressures, step=step)
+
+
+def _shifted(commands: Array, samples: float) -> Array:
+    """Held commands a part of a sample later (positive) or earlier, as means over the rows."""
+    share = min(abs(samples), 1.0)
+    moved = np.empty_like(commands)
+    if samples >= 0.0:
+        moved[1:], moved[0] = commands[:-1], commands[0]
+    else:
+        moved[:-1], moved[-1] = commands[1:], commands[-1]
+    return (1.0 - share) * commands + share * moved
+
+
+def _plant(rig: Rig, base: HalfCar, v: Mapping[str, float]) -> Plant:
+    body = base.body
+    body = body._replace(
+        **{name: v[name] for name in body._fields if name in v},
+        damping_front=v.get("bushing_damping_front", body.damping_front),
+        damping_rear=v.get("bushing_damping_rear", body.damping_rear),
+        area_scale_front=v.get("effective_area_scale_front", body.area_scale_front),
+        area_scale_rear=v.get("effective_area_scale_rear", body.area_scale_rear),
+    )
+    return Plant(body, _gas(rig, base.front, v, "front"), _gas(rig, base.rear, v, "rear"))
+
+
+def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
+    volume = v.get(f"volume_scale_{end}", rig.volume_scale.value)
+    slope = v.get(f"volume_slope_scale_{end}", rig.volume_scale.value)
+    level = VOLUME_OFFSET + MEAN_AREA * rig.design_height.value
+    coefficient = v.get(f"discharge_coefficient_{end}", rig.discharge_coefficient.value)
+    supply = v.get("supply_pressure", gas.supply_pressure)
+    # The log carries the commanded outlet; the estimate is of the opening that the nominal command really gives.
+    nominal = getattr(rig, f"outlet_area_{end}").value
+    opening = v.get(f"outlet_area_{end}", nominal) / nominal if nominal > 0.0 else 1.0
+    return gas._replace(
+        supply_pressure=supply,
+        supply_power=(gas.reference_pressure / supply) ** gas.k,
+        inlet_scale=coefficient,
+        outlet_scale=coefficient * opening,
+        volume_offset=level * volume - MEAN_AREA * slope * rig.design_height.value,
+        mean_area=MEAN_AREA * slope,
+    )
+
+
+def _channels(states: Array, body: Body) -> Array:
+    """(..., 10) -> (..., 6): sprung points above the axles, axles, pressures."""
+    heave, pitch = states[..., 0], states[..., 1]
+    front, rear = heave + body.front_arm * pitch, heave - body.rear_arm * pitch
+    out = np.empty((*states.shape[:-1], 6))
+    out[..., 0], out[..., 1] = front, rear
+    out[..., 2:4], out[..., 4:6] = states[..., 2:4], states[..., 8:10]
+    return out
+
+
+def _ends_rates(state: Array, body: Body) -> Array:
+    return _channels(np.concatenate([state[4:8], np.zeros(6)]), body)[:4]
+
+
+def _state(channels: Array, rates: Array, body: Body) -> Array:
+    base = body.front_arm + body.rear_arm
+    pitch, pitch_rate = (channels[0] - channels[1]) / base, (rates[0] - rates[1]) / base
+    heave, heave_rate = channels[0] - body.front_arm * pitch, rates[0] - body.front_arm * pitch_rate
+    return np.array([heave, pitch, *channels[2:4], heave_rate, pitch_rate, *rates[2:4], *channels[4:6]])

@@ -1,0 +1,164 @@
+"""Which candidates are worth a fit: the gain each promises once the nuisance parameters have answered it.
+
+A trial prediction with the effect at a start value moves the outputs by some trajectory (not only infinitesimally: a
+deadband or a stop does nothing when small). Projected onto what nuisance parameters and initial state cannot do, and
+compared with the residual, it tells the share of the misfit it could explain. Pairs need no further simulation: the
+Gram matrix of the projected trajectories holds them, so that two effects that only work together are found as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+
+from pneumo_ros.gap.fit import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
+from pneumo_ros.gap.model import Array, EffectParameter, Mask
+from pneumo_ros.gap.problem import Candidate, Part, Problem
+
+SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A candidate extension with the share of the misfit (mean square) that it may explain.
+
+    Attributes
+    ----------
+    parts : the effects added
+    values : their parameter values, SI, scaled by the linear estimate of the size
+    share : 0..1
+    """
+
+    parts: tuple[Part, ...]
+    values: tuple[float, ...]
+    share: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect at a site with start values and the change of the residual it makes, (n, C)."""
+
+    part: Part
+    values: tuple[float, ...]
+    change: Array
+
+
+def start_values(parameters: Sequence[EffectParameter]) -> list[tuple[float, ...]]:
+    """Values worth trying: sizes typical, small and at their further starts; one shape parameter at a time
+    elsewhere.
+    """
+    typical = [p.typical for p in parameters]
+    tries = [tuple(typical)]
+    tries.append(tuple(p.typical * SMALL if p.size else p.typical for p in parameters))
+    for k, p in enumerate(parameters):
+        for value in p.starts:
+            tries.append(tuple(value if m == k else v for m, v in enumerate(typical)))
+    sizes = [k for k, p in enumerate(parameters) if p.size]
+    if len(sizes) > 1:  # each size alone
+        tries += [tuple(v if m == k or m not in sizes else 0.0 for m, v in enumerate(typical)) for k in sizes]
+    return list(dict.fromkeys(tries))
+
+
+def all_parts(problem: Problem) -> list[Part]:
+    """Every effect of the library at every site."""
+    return [(e.id, site) for e in problem.model.effects.values() for site in e.sites]
+
+
+def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
+    """Simulate each part at each start on top of a fit; what diverges or moves nothing is left out."""
+    out = []
+    own = list(problem.values(base.candidate, base.x))
+    for part in parts:
+        candidate = Candidate((*base.candidate.parts, part))
+        for values in start_values(problem.model.effects[part[0]].parameters):
+            x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
+            change = problem.residual(candidate, x) - base.residual
+            if np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6:
+                out.append(Trial(part, values, change))
+    return out
+
+
+def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[Promise]:
+    """Singles (or pairs) of the trials, the most promising first, one entry for each part (or pair of parts)."""
+    gram, with_residual, total = _projected(problem, base, found)
+    best: dict[tuple[Part, ...], Promise] = {}
+    for members in combinations(range(len(found)), 2) if pairs else product(range(len(found))):
+        parts = tuple(found[m].part for m in members)
+        if pairs and not compatible(parts):
+            continue
+        signed = np.array([_signed(problem, found[m]) for m in members])
+        share, sizes = _explained(gram, with_residual, members, total, signed)
+        if share > best.get(parts, _NOTHING).share:
+            values = [_scaled(problem, found[m], s) for m, s in zip(members, sizes, strict=True)]
+            best[parts] = Promise(parts, tuple(v for one in values for v in one), share)
+    return sorted(best.values(), key=lambda p: -p.share)
+
+
+_NOTHING = Promise((), (), 0.0)
+
+
+def compatible(parts: tuple[Part, ...]) -> bool:
+    """Two sites of one effect only where they do not overlap."""
+    (first, site), (second, other) = parts
+    return first != second or (site != other and "both" not in (site, other))
+
+
+def _signed(problem: Problem, trial: Trial) -> bool:
+    """Whether its sizes may as well be negative."""
+    return all(p.low < 0.0 for p in problem.model.effects[trial.part[0]].parameters if p.size)
+
+
+def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
+    """The trial's values with its sizes multiplied; kept within a factor of three, where the line may still be
+    believed.
+    """
+    factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
+    parameters = problem.model.effects[trial.part[0]].parameters
+    return tuple(
+        float(np.clip(v * factor, p.low, p.high)) if p.size else v
+        for v, p in zip(trial.values, parameters, strict=True)
+    )
+
+
+def _projected(problem: Problem, base: Fit, found: Sequence[Trial]) -> tuple[Array, Array, float]:
+    """Gram matrix of the changes and their products with the residual, both free of what the base's unknowns can do."""
+    assert base.jacobian is not None
+    rows = problem.fitted
+    r = base.residual[rows]
+    limit = HUBER * robust_scale(r)
+    root = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-12)))
+    weighted = (r * root).ravel()
+    mean = float(np.mean(weighted**2))
+    strength = 1.0 / (CORRELATION * (COST_FLOOR + mean))
+    low, high = problem.bounds(base.candidate)
+    free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
+    J = (base.jacobian[rows][:, :, free] * root[:, :, None]).reshape(weighted.size, -1)
+    prior = np.where(np.arange(len(base.x)) < problem.fixed, 1.0, 1e-9)[free]
+    solve = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))
+    if not found:
+        return np.zeros((0, 0)), np.zeros(0), 1.0
+    D = np.stack([(t.change[rows] * root).ravel() for t in found])
+    DJ = D @ J
+    gram = D @ D.T - strength * DJ @ solve @ DJ.T
+    with_residual = D @ weighted - strength * DJ @ (solve @ (J.T @ weighted))
+    return gram, with_residual, float(weighted @ weighted)
+
+
+def _explained(
+    gram: Array, with_residual: Array, members: tuple[int, ...], total: float, signed: Mask
+) -> tuple[float, Array]:
+    """Share of the misfit that multiples of the members explain (non-negative where not ``signed``), and the
+    multiples.
+    """
+    index = list(members)
+    G, b = gram[np.ix_(index, index)], -with_residual[index]
+    diagonal: Array = np.asarray(np.maximum(np.diag(G), 1e-12))
+    if len(index) == 2 and abs(G[0, 1]) > 0.995 * np.sqrt(diagonal[0] * diagonal[1]):
+        return 0.0, np.zeros(2)
+    sizes: Array = np.asarray(np.linalg.solve(G + np.diag(1e-9 * diagonal), b))
+    if np.any((sizes <= 0.0) & ~signed):
+        return 0.0, sizes
+    return float(np.clip(b @ sizes / total, 0.0, 1.0)), sizes

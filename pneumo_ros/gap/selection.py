@@ -1,0 +1,115 @@
+"""Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
+
+Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than
+structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of
+the library are true to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneumo_ros.gap.fit import COST_FLOOR, Fit
+from pneumo_ros.gap.model import Array
+from pneumo_ros.gap.problem import Problem
+
+TOLL = 4.0  # of the cost, for each parameter
+SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What counts as evidence.
+
+    Attributes
+    ----------
+    first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
+    first_cost, second_cost : fall of the training cost that it must bring
+    least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
+    model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
+        inferred from less
+    """
+
+    first: float = 0.12
+    second: float = 0.2
+    first_cost: float = 15.0
+    second_cost: float = 20.0
+    least: float = 0.3
+    model_form: float = 0.03
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fit with its score on the selection blocks.
+
+    Attributes
+    ----------
+    fit : the candidate
+    level : mean square, sigmas
+    blocks : (B,) mean square of each selection block
+    """
+
+    fit: Fit
+    level: float
+    blocks: Array
+
+    @property
+    def size(self) -> int:
+        """Number of effects."""
+        return len(self.fit.candidate.parts)
+
+
+def score(problem: Problem, fit: Fit) -> Scored:
+    """Mean squares on the selection blocks; samples that are missing do not count."""
+    there = problem.weight > 0.0
+    squares = np.where(there, fit.residual**2, 0.0)
+    blocks = []
+    for number in np.unique(problem.block[~problem.fitted]):
+        rows = problem.block == number
+        blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
+    values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
+    return Scored(fit, float(np.mean(values)), values)
+
+
+def advantage(poorer: Scored, richer: Scored) -> float:
+    """Fall of log mean square from the poorer to the richer structure."""
+    return float(np.log((COST_FLOOR + poorer.level) / (COST_FLOOR + richer.level)))
+
+
+def standard_error(one: Scored, other: Scored) -> float:
+    """Of the difference of their levels over the blocks."""
+    difference = one.blocks - other.blocks
+    if len(difference) < 2:
+        return 0.0
+    return float(np.std(difference, ddof=1) / np.sqrt(len(difference)))
+
+
+def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Scored:
+    """The chosen structure; the refit itself when nothing beats it by enough."""
+    chosen = refit
+    for size, gain, cost in ((1, limits.first, limits.first_cost), (2, limits.second, limits.second_cost)):
+        rivals = [f for f in finalists if f.size == size]
+        if not rivals:
+            continue
+        best = _simplest(rivals)
+        poorer = chosen
+        fallen = poorer.level - best.level
+        evidence = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
+        beyond_form = fallen > limits.model_form**2 * refit.level
+        if evidence and (size == 1 or beyond_form):
+            chosen = best
+    return chosen
+
+
+def _simplest(rivals: Sequence[Scored]) -> Scored:
+    """Among those within one standard error of the best: least training cost, each parameter paying :data:`TOLL`.
+
+    The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
+    structures that predict alike, the one that needs no stretched tolerance is right.
+    """
+    best = min(rivals, key=lambda s: s.level)
+    close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
+    return min(close, key=lambda s: s.fit.cost + TOLL * len(s.fit.x))

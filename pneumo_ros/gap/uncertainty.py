@@ -1,0 +1,82 @@
+"""Standard deviations of a fit's parameters, and what is wrong with the parameters themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pneumo_ros.gap.diagnosis import Estimate
+from pneumo_ros.gap.fit import Fit
+from pneumo_ros.gap.model import Array, Mask
+from pneumo_ros.gap.problem import Problem
+
+LONGEST = 60  # fit samples over which the residual's correlation is summed
+NOTHING = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by
+
+
+def covariance(problem: Problem, fit: Fit) -> Array:
+    """Covariance of the scaled unknowns: curvature of the data over the residual's own size and correlation, and prior.
+
+    An unknown at its bound does not vary.
+    """
+    assert fit.jacobian is not None
+    free = _free(problem, fit)
+    J = fit.jacobian[:, :, free].reshape(-1, int(free.sum()))
+    prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)[free]
+    strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
+    out = np.zeros((len(fit.x), len(fit.x)))
+    out[np.ix_(free, free)] = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))
+    return out
+
+
+def correlation_time(residual: Array) -> float:
+    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero, worst half of the channels."""
+    times = []
+    for column in (residual - residual.mean(axis=0)).T:
+        power = float(column @ column)
+        if power <= 0.0:
+            continue
+        total = 1.0
+        for lag in range(1, min(LONGEST, len(column) - 1)):
+            rho = float(column[lag:] @ column[:-lag]) / power
+            if rho <= 0.0:
+                break
+            total += 2.0 * rho
+        times.append(total)
+    return float(np.median(times)) if times else 1.0
+
+
+def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """Effect parameters, SI; a name that two effects share is prefixed with the effect's id."""
+    assert fit.jacobian is not None
+    parameters = problem.effect_parameters(fit.candidate)
+    owners = [effect for effect, _ in fit.candidate.parts for _ in problem.model.effects[effect].parameters]
+    names = [p.name for p in parameters]
+    free = _free(problem, fit)
+    out = {}
+    for k, (p, owner) in enumerate(zip(parameters, owners, strict=True)):
+        m = problem.fixed + k
+        moved = float(np.sqrt(np.mean(fit.jacobian[:, :, m] ** 2)))
+        name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
+        while name in out:
+            name += "_2"
+        at_bound = not free[m] and not (p.size and p.low == 0.0 and fit.x[m] == 0.0)
+        out[name] = Estimate(
+            float(fit.x[m] * p.typical), float(np.sqrt(cov[m, m]) * p.typical), p.unit, at_bound, moved < NOTHING
+        )
+    return out
+
+
+def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """Nuisance parameters, SI."""
+    values = problem.nuisance(fit.x)
+    free = _free(problem, fit)
+    return {
+        p.name: Estimate(float(values[m]), float(np.sqrt(cov[m, m]) * p.std), p.unit, not free[m])
+        for m, p in enumerate(problem.model.parameters)
+    }
+
+
+def _free(problem: Problem, fit: Fit) -> Mask:
+    low, high = problem.bounds(fit.candidate)
+    width = np.where(np.isfinite(high - low), high - low, 1.0)
+    return np.asarray((fit.x > low + 1e-6 * width) & (fit.x < high - 1e-6 * width))

@@ -1,0 +1,110 @@
+"""From scores to a verdict with a probability.
+
+Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the
+effect is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept
+from the fit?
+The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneumo_ros.gap.problem import Candidate
+from pneumo_ros.gap.selection import Scored, Thresholds
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Constants of the probabilities.
+
+    Attributes
+    ----------
+    sharpness : fall of log probability per unit of log mean square on the selection blocks
+    leftover : share of the refit's misfit (rms) left by the best named structure at which "unknown" is as likely as it
+    steepness : exponent of that transition
+    floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
+    real : mean square of the refit above which a gap without a name counts as unknown rather than none
+    """
+
+    sharpness: float = 12.0
+    leftover: float = 0.12
+    steepness: float = 4.0
+    floor: float = 1.0
+    real: float = 2.5
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """Probabilities of all hypotheses.
+
+    Attributes
+    ----------
+    chosen : the selected structure (the refit for "none" and "unknown")
+    verdict : id, pair of ids, "none" or "unknown"
+    named : probability of each finalist and of the refit ("none"), by candidate
+    unknown : probability that the library lacks the effect
+    """
+
+    chosen: Scored
+    verdict: str
+    named: Mapping[Candidate, float]
+    unknown: float
+
+    @property
+    def probability(self) -> float:
+        """Of the verdict: all candidates of the same effects count together, whatever their sites."""
+        if self.verdict == "unknown":
+            return self.unknown
+        return min(1.0, sum(p for c, p in self.named.items() if name_of(c) == self.verdict))
+
+
+def name_of(candidate: Candidate) -> str:
+    """Verdict word of a candidate; one effect at two places is still that effect."""
+    return "+".join(dict.fromkeys(sorted(effect for effect, _ in candidate.parts))) or "none"
+
+
+def judge(
+    refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
+) -> Opinion:
+    """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection."""
+    named = _named(refit, finalists, chosen, limits, calibration)
+    unknown = _unknown(refit, chosen, calibration)
+    scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
+    verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
+    return Opinion(chosen, verdict, scaled, unknown)
+
+
+def _named(
+    refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
+) -> dict[Candidate, float]:
+    """Softmax of scores; each further effect pays what chance would give it, and more where laws are only similar."""
+    tolerances = len(refit.fit.x)
+    form = limits.model_form**2 * refit.level
+
+    def height(s: Scored) -> float:
+        level = np.log(calibration.floor * 0.3 + form + s.level)
+        toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
+        stretched = 0.5 * float(np.sum(s.fit.x[:tolerances] ** 2))
+        return float(-calibration.sharpness * (level + toll) - stretched)
+
+    heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
+    top = max(heights.values())
+    # The selection decides; what it chose is at least as probable as any other.
+    heights[chosen.fit.candidate] = max(top, heights[chosen.fit.candidate])
+    weights = {c: float(np.exp(h - top)) for c, h in heights.items()}
+    total = sum(weights.values())
+    return {c: w / total for c, w in weights.items()}
+
+
+def _unknown(refit: Scored, chosen: Scored, calibration: Calibration) -> float:
+    """Probability that what is left is the work of something without a name."""
+    left = max(0.0, chosen.level - calibration.floor)
+    if chosen.size == 0:
+        share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
+    else:
+        share = (np.sqrt(left / max(refit.level, 1e-9)) / calibration.leftover) ** calibration.steepness
+    return float(share / (1.0 + share))

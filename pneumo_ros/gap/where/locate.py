@@ -1,0 +1,260 @@
+"""Which places make the gap: the smallest set of places whose flexible correction closes it, and each one's fair share.
+
+The corrections are fitted to the weak residuals of the logs to fit and judged on those of the log held out, always with
+the uncertain parameters free inside their tolerances. The set is chosen on alternate blocks of the logs to fit, so that
+the held-out log only judges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.gap.held_out import free_run
+from pneumo_ros.gap.model import Active
+from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
+from pneumo_ros.gap.where.solve import Forms, best_subset, forms_of, shapley
+from pneumo_ros.gap.where.weak import EQUATIONS
+
+Array = NDArray[np.float64]
+
+# In null standard deviations (rms). Rigs with nothing but tolerances stay below 1.25 whatever laws they are made with,
+# and no single place closes more than a fifth of that.
+FLAT = 1.5
+SINGLED_OUT = 0.3
+LARGEST = 5  # places in a set: two effects at both ends, and one more to see that it is not needed
+# A further place must take this share of what is left (mean square) to be believed.
+WORTH = 0.4
+BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
+
+
+@dataclass(frozen=True)
+class Start:
+    """The model that the search starts from: nominal by default.
+
+    Attributes
+    ----------
+    nuisance : (P,) parameter values already fitted, or None
+    active : effects already in the model
+    """
+
+    nuisance: Array | None = None
+    active: tuple[Active, ...] = ()
+
+    @property
+    def nominal(self) -> bool:
+        """Whether nothing has been fitted yet."""
+        return self.nuisance is None and not self.active
+
+    def predict(self, model: RigModel, signals: Signals) -> Array:
+        """(N, 6) the model's free run of a log."""
+        return free_run(model, signals, self.values(model, np.zeros(len(model.parameters))), self.active)
+
+    def offset(self, model: RigModel) -> Array:
+        """(P,) standard deviations that the parameters are from nominal."""
+        if self.nuisance is None:
+            return np.zeros(len(model.parameters))
+        return np.array([(v - p.nominal) / p.std for v, p in zip(self.nuisance, model.parameters, strict=True)])
+
+    def values(self, model: RigModel, sigmas: Array) -> Array:
+        """(P,) parameter values, ``sigmas`` standard deviations from the start's."""
+        own = [p.nominal for p in model.parameters] if self.nuisance is None else self.nuisance
+        return np.asarray(own, dtype=float) + sigmas * np.array([p.std for p in model.parameters])
+
+
+@dataclass(frozen=True)
+class Location:
+    """Where the gap lives.
+
+    Attributes
+    ----------
+    shares : (place, share of the held-out squared residual), largest first; what is missing to one is
+        unexplained
+    chosen : the smallest set of places that closes what can be closed; empty if there is no gap to speak of
+    alone : (place, share closed when it alone is corrected), largest first
+    rivals : other sets of the same size that close nearly as much, with the level they leave
+    level : rms residual in null standard deviations on the held-out log: ``nominal``, ``refit`` (parameters inside
+        their tolerances), ``chosen`` and ``flexible`` (all places at once)
+    equations : per equation the level (``nominal``, ``refit``, ``chosen``)
+    nuisance : (P,) parameters that go with ``chosen``, in standard deviations from the start's
+    coefficients : of every basis, zero outside ``chosen``
+    designs : the fitted logs' problems and the judge's, for what comes after (regimes, simulation)
+    """
+
+    shares: tuple[tuple[str, float], ...]
+    chosen: tuple[str, ...]
+    alone: tuple[tuple[str, float], ...]
+    rivals: tuple[tuple[tuple[str, ...], float], ...]
+    level: dict[str, float]
+    equations: dict[str, dict[str, float]]
+    nuisance: Array
+    coefficients: Array
+    refit_nuisance: Array
+    fit: tuple[Design, ...]
+    judge: Design
+    forms: Forms
+    start: Start
+
+    @property
+    def flat(self) -> bool:
+        """Whether noise, tolerances and model form explain every equation."""
+        return not self.chosen
+
+    @property
+    def flexible_improves(self) -> float:
+        """How much lower (ratio of levels) the chosen flexible correction leaves the residual than refitting does."""
+        return self.level["refit"] / max(self.level["chosen"], 1.0)
+
+
+def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Start | None = None) -> Location:
+    """Find the places of the gap between a rig model and its logs.
+
+    Parameters
+    ----------
+    model : the nominal rig with its tolerances
+    fit : logs the corrections are fitted to
+    holdout : log they are judged on
+    start : parameters and effects already in the model; the places then tell what those leave
+    """
+    start = start or Start()
+    designs = _designs(model, [*fit, holdout], start)
+    fitted, judge = designs[:-1], designs[-1]
+    offset, count = start.offset(model), len(model.parameters)
+    places = [basis.place for basis in judge.bases]
+    choice = _halved(fitted, offset, places)
+    final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
+    names = final.testable()
+    chosen = _smallest(choice, names)
+    sets = chosen or best_subset(choice, 3, [], names)
+    refit_square = final.value(())
+    shares = {place: max(part, 0.0) / refit_square for place, part in shapley(final, sets).items()}
+    alone = {place: 1.0 - final.value([place]) / refit_square for place in names}
+    return Location(
+        shares=_sorted(shares),
+        chosen=tuple(sorted(chosen, key=lambda place: -shares[place])),
+        alone=_sorted({place: share for place, share in alone.items() if share > 0.0}),
+        rivals=_rivals(final, chosen, names),
+        level={
+            "nominal": float(np.sqrt(judge.residual[judge.weight > 0] @ judge.residual[judge.weight > 0] / final.rows)),
+            "refit": float(np.sqrt(refit_square)),
+            "chosen": float(np.sqrt(final.value(chosen))),
+            "flexible": float(np.sqrt(final.value(names))),
+        },
+        equations=_by_equation(judge, final, chosen),
+        nuisance=final.coefficients(chosen)[:count],
+        coefficients=spread(final, chosen),
+        refit_nuisance=final.coefficients(())[:count],
+        fit=tuple(fitted),
+        judge=judge,
+        forms=final,
+        start=start,
+    )
+
+
+def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> Array:
+    """Residuals (K, 6) in null standard deviations with parameters (in sigma) and corrections applied."""
+    return np.asarray(
+        design.residual + np.tensordot(nuisance, design.parameters, 1) + np.tensordot(coefficients, design.columns, 1)
+    )
+
+
+def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
+    explained = [None if start.nominal else start.predict(model, log) for log in logs]
+    first = design_of(model, logs[0], explained=explained[0])
+    yardstick = first.features.yardstick
+    rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
+    designs = [first, *rest]
+    offset, places = start.offset(model), [basis.place for basis in first.bases]
+    # Twice: the first pass moves to within a few per cent of the sensor's error, the second removes what bends.
+    for _ in range(2):
+        forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)
+        for place in [name for name in forms.testable() if name.startswith("sensor:")]:
+            error = forms.solve([place])[len(offset) :]
+            designs = [with_sensor_columns(design, model, place, error) for design in designs]
+    return designs
+
+
+def _flat(design: Design) -> tuple[Array, Array]:
+    columns = np.concatenate([design.parameters, design.columns])
+    return design.residual.ravel(), columns.reshape(len(columns), -1).T
+
+
+def _stacked(designs: Sequence[Design]) -> tuple[Array, Array]:
+    parts = [_flat(design) for design in designs]
+    return np.concatenate([residual for residual, _ in parts]), np.concatenate([columns for _, columns in parts])
+
+
+def _halved(designs: Sequence[Design], offset: Array, places: Sequence[str]) -> Forms:
+    """Fitted on every other block of the logs to fit, judged on the blocks between."""
+    residual, columns = _stacked(designs)
+    odd = np.concatenate([_odd_rows(design) for design in designs])
+    return forms_of(
+        (residual * ~odd, columns * ~odd[:, None]), (residual * odd, columns * odd[:, None]), offset, places
+    )
+
+
+def _odd_rows(design: Design) -> NDArray[np.bool_]:
+    block = (design.windows.centres * design.signals.period / BLOCK).astype(int)
+    return np.repeat(block % 2 == 1, len(EQUATIONS))
+
+
+def _smallest(forms: Forms, places: Sequence[str]) -> list[str]:
+    """The smallest set after which further places stop being worth their while."""
+    levels = [forms.value(())]
+    sets: list[list[str]] = [[]]
+    for size in range(1, min(LARGEST, len(places)) + 1):
+        sets.append(best_subset(forms, size, sets[-1], places))
+        levels.append(forms.value(sets[-1]))
+    if levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]:
+        return []
+    for size, level in enumerate(levels[1:], start=1):
+        ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]
+        if level < FLAT**2 or all(ahead):
+            return sets[size]
+    return sets[-1]
+
+
+def _rivals(forms: Forms, chosen: Sequence[str], places: Sequence[str]) -> tuple[tuple[tuple[str, ...], float], ...]:
+    """Sets that differ from the chosen one by one place and leave at most a quarter more."""
+    limit = 1.25**2 * max(forms.value(chosen), 1.0)
+    found = []
+    for k in range(len(chosen)):
+        for place in places:
+            if place in chosen:
+                continue
+            other = [*chosen[:k], place, *chosen[k + 1 :]]
+            if forms.value(other) < limit:
+                found.append((tuple(other), float(np.sqrt(forms.value(other)))))
+    return tuple(sorted(found, key=lambda rival: rival[1])[:5])
+
+
+def _by_equation(judge: Design, forms: Forms, chosen: Sequence[str]) -> dict[str, dict[str, float]]:
+    count = forms.parameters
+    none = np.zeros(len(judge.columns))
+    states = {
+        "nominal": judge.residual,
+        "refit": corrected_residual(judge, forms.coefficients(())[:count], none),
+        "chosen": corrected_residual(judge, forms.coefficients(chosen)[:count], spread(forms, chosen)),
+    }
+    rows = np.maximum(judge.weight.sum(axis=0), 1.0)
+    return {
+        equation: {name: float(np.sqrt((r[:, e] ** 2).sum() / rows[e])) for name, r in states.items()}
+        for e, equation in enumerate(EQUATIONS)
+    }
+
+
+def spread(forms: Forms, chosen: Sequence[str]) -> Array:
+    """Coefficients of every basis: fitted inside the chosen places, zero outside."""
+    out = np.zeros(len(forms.sizes))
+    if chosen:
+        out[forms.index(chosen)[forms.parameters :] - forms.parameters] = forms.coefficients(chosen)[forms.parameters :]
+    return out
+
+
+def _sorted(shares: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(((place, float(share)) for place, share in shares.items()), key=lambda item: -item[1]))

@@ -1,0 +1,295 @@
+"""What the dashboard hears of a running session, and what it may ask of it. The session never waits for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_msgs.msg import Bool, String
+from std_srvs.srv import Trigger
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.nodes.emergency_stop import RESET_SERVICE, TRIP_SERVICE
+from pneumo_ros.nodes.interfaces import message_class
+from pneumo_ros.nodes.qos import publisher_qos
+from pneumo_ros.nodes.spin import SPIN_TIMEOUT, make_executor
+from pneumo_ros.parameters import Value
+from pneumo_ros.rig import Rig, load_rig, parse_rig
+from pneumo_ros.session import topics
+from pneumo_ros.session.cdr import JointDecoder, decode_pressure
+from pneumo_ros.session.dashboard.panels import SHOWN, Samples
+from pneumo_ros.session.dashboard.source import Control, Status
+from pneumo_ros.session.inspection import Event
+
+NODE_NAME = "dashboard"
+CAPACITY = 60_000  # samples a topic: 30 s at 2 kHz, 2 min at 500 Hz
+QUIET = 1.5  # s without a sample after which the session is taken to be over or not there
+TUNABLE = ("controller", "estimator")
+LOOK_PERIOD = 1.0  # s between looks for the parameters of a node that has not answered yet
+_ENDING = ("session_complete", "session_stopped", "node_died")
+_DEPTH = 50
+_NUMBERS = {ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL}
+
+
+class Ring:
+    """The last samples of one topic. One thread appends, others read."""
+
+    def __init__(self, names: Sequence[str], capacity: int = CAPACITY) -> None:
+        self.names = tuple(names)
+        self._time = np.zeros(capacity, np.int64)
+        self._values = np.zeros((capacity, len(self.names)))
+        self._count = 0
+        self._lock = threading.Lock()
+
+    def append(self, time_ns: int, values: Sequence[float]) -> None:
+        """Add one; a stamp that goes back starts a new session."""
+        with self._lock:
+            if self._count and time_ns < self._time[(self._count - 1) % len(self._time)]:
+                self._count = 0
+            row = self._count % len(self._time)
+            self._time[row], self._values[row] = time_ns, values
+            self._count += 1
+
+    def since(self, begin_ns: int) -> Samples:
+        """Those with stamps from ``begin_ns`` on."""
+        with self._lock:
+            order = self._order()
+            time, values = self._time[order], self._values[order]
+        return Samples(time, self.names, values).between(begin_ns, np.iinfo(np.int64).max - 1)
+
+    def _order(self) -> NDArray[np.int64]:
+        size = len(self._time)
+        if self._count <= size:
+            return np.arange(self._count)
+        return np.roll(np.arange(size), -(self._count % size))
+
+
+class LiveLink:
+    """Source and controls of the dashboard for the session on a DDS domain. A context manager.
+
+    Parameters
+    ----------
+    domain_id : DDS domain, or None for the environment's
+    """
+
+    title = "running session"
+
+    def __init__(self, domain_id: int | None = None) -> None:
+        self._context = Context()
+        rclpy.init(context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node(NODE_NAME, context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._rings = {topic.name: Ring(_names(topic)) for topic in SHOWN}
+        self._events: deque[Event] = deque(maxlen=1000)
+        self._answers: deque[str] = deque(maxlen=100)
+        self._controls: dict[str, list[Control]] = {}
+        self._clients = {name: AsyncParameterClient(self._node, name) for name in TUNABLE}
+        self._rig = load_rig()
+        self._start_ns, self._latest_ns, self._heard = 0, 0, 0.0
+        self._ended = ""
+        self._subscribe()
+        self._stop_topic = self._node.create_publisher(Bool, topics.ESTOP.name, publisher_qos(topics.ESTOP.flow, True))
+        self._trip = self._node.create_client(Trigger, TRIP_SERVICE)
+        self._reset = self._node.create_client(Trigger, RESET_SERVICE)
+        self._node.create_timer(LOOK_PERIOD, self._look_for_parameters)
+        self._running = True
+        self._thread = threading.Thread(target=self._spin, name="dashboard-link", daemon=True)
+
+    def __enter__(self) -> LiveLink:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._running = False
+        self._thread.join()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _spin(self) -> None:
+        executor = make_executor("single", self._context)
+        executor.add_node(self._node)
+        while self._running and self._context.ok():
+            executor.spin_once(timeout_sec=SPIN_TIMEOUT)
+        executor.shutdown()
+
+    # -- what is heard ---------------------------------------------------------------------------------------------
+
+    def _subscribe(self) -> None:
+        # Best effort: a page that cannot keep up loses samples; it must never hold up a reliable publisher.
+        stream = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for topic in SHOWN:
+            self._node.create_subscription(message_class(topic.type), topic.name, self._taker(topic), stream, raw=True)
+        latched = QoSProfile(
+            depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+        )
+        self._node.create_subscription(DiagnosticArray, topics.EVENTS.name, self._on_events, latched)
+        self._node.create_subscription(String, topics.CONFIG.name, self._on_config, latched)
+
+    def _taker(self, topic: topics.Topic) -> Callable[[bytes], None]:
+        ring = self._rings[topic.name]
+        read = JointDecoder(topic.name, topic.names).decode if topic.type == topics.JOINT else _read_pressure
+
+        def take(data: bytes) -> None:
+            try:
+                stamp, values = read(data)
+            except InputError as error:
+                self._answers.append(str(error))
+                return
+            ring.append(stamp, values)
+            self._note_time(stamp)
+
+        return take
+
+    def _note_time(self, stamp: int) -> None:
+        # Stragglers may follow the event that ends a session; the stamps of the next one are far from them.
+        if not self._start_ns or abs(stamp - self._latest_ns) > QUIET * 1e9:
+            self._start_ns = self._latest_ns = stamp
+            self._ended = ""
+        self._latest_ns, self._heard = max(stamp, self._latest_ns), time.monotonic()
+
+    def _on_events(self, message: DiagnosticArray) -> None:
+        now = self._latest_ns or message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        for status in message.status:
+            values = {pair.key: pair.value for pair in status.values}
+            code = values.pop("code", "")
+            level = int.from_bytes(status.level, "little") if isinstance(status.level, bytes) else int(status.level)
+            self._events.append(Event(now, level, status.name, code, status.message, values))
+            if code in _ENDING:
+                self._ended = f"{code}: {status.message}"
+
+    def _on_config(self, message: String) -> None:
+        try:
+            self._rig = parse_rig(message.data, topics.CONFIG.name)
+        except InputError as error:
+            self._answers.append(str(error))
+
+    # -- Source ----------------------------------------------------------------------------------------------------
+
+    @property
+    def rig(self) -> Rig:
+        """As the session publishes it; the nominal one before."""
+        return self._rig
+
+    def tick(self, elapsed: float) -> None:
+        """Time passes by itself."""
+
+    def status(self) -> Status:
+        """Live, waiting for samples, or ended; the last samples stay."""
+        if not self._latest_ns:
+            return Status("waiting", 0, 0, 0, "no session is heard on this domain yet")
+        quiet = time.monotonic() - self._heard > QUIET
+        if self._ended and quiet:
+            return Status("ended", self._latest_ns, self._start_ns, self._latest_ns, self._ended)
+        remark = f"nothing heard for {time.monotonic() - self._heard:.0f} s" if quiet else ""
+        return Status("waiting" if quiet else "live", self._latest_ns, self._start_ns, self._latest_ns, remark)
+
+    def window(self, seconds: float) -> Mapping[str, Samples]:
+        """The newest ``seconds`` of every topic that has said something."""
+        begin = self._latest_ns - round(seconds * 1e9)
+        found = {name: ring.since(begin) for name, ring in self._rings.items()}
+        return {name: samples for name, samples in found.items() if len(samples.time_ns)}
+
+    def events(self) -> Sequence[Event]:
+        """Everything said on /rig/events."""
+        return list(self._events)
+
+    # -- Controls --------------------------------------------------------------------------------------------------
+
+    def estop(self) -> None:
+        """By topic, which needs no answer, and by service, which gives one."""
+        self._stop_topic.publish(Bool(data=True))
+        self._call(self._trip, "emergency stop")
+
+    def reset(self) -> None:
+        """Ask the owner of the valves to release the stop."""
+        self._call(self._reset, "release")
+
+    def parameters(self) -> Sequence[Control]:
+        """Numbers and switches of controller and estimator that may change live."""
+        return [control for name in TUNABLE for control in self._controls.get(name, [])]
+
+    def change(self, node: str, name: str, value: Value) -> None:
+        """Set a parameter; the node's own range decides."""
+        client = self._clients[node]
+        if not client.services_are_ready():
+            self._answers.append(f"{node}.{name}: the node is gone")
+            return
+        label = f"{node}.{name} = {value}"
+
+        def answered(future: Future[Any]) -> None:
+            result = future.result().results[0]
+            self._answers.append(f"{label}: {'set' if result.successful else 'refused, ' + result.reason}")
+
+        client.set_parameters([Parameter(name, value=value)]).add_done_callback(answered)
+
+    def answers(self) -> list[str]:
+        """Since the last call."""
+        out = []
+        while self._answers:
+            out.append(self._answers.popleft())
+        return out
+
+    def _call(self, client: Any, what: str) -> None:
+        if not client.service_is_ready():
+            self._answers.append(f"{what}: sent by topic only, no node offers the service")
+            return
+
+        def answered(future: Future[Any]) -> None:
+            result = future.result()
+            self._answers.append(f"{what}: {'done' if result.success else 'refused'}, {result.message}")
+
+        client.call_async(Trigger.Request()).add_done_callback(answered)
+
+    def _look_for_parameters(self) -> None:
+        for name, client in self._clients.items():
+            if name not in self._controls and client.services_are_ready():
+                self._controls[name] = []
+                client.list_parameters().add_done_callback(lambda f, n=name: self._describe(n, f.result().result.names))
+
+    def _describe(self, node: str, names: Sequence[str]) -> None:
+        client = self._clients[node]
+
+        def described(future: Future[Any]) -> None:
+            kept = [d for d in future.result().descriptors if not d.read_only and d.type in _NUMBERS]
+            wanted = [d.name for d in kept if d.name != "use_sim_time"]
+            client.get_parameters(wanted).add_done_callback(lambda f: self._keep(node, kept, wanted, f.result().values))
+
+        client.describe_parameters(list(names)).add_done_callback(described)
+
+    def _keep(
+        self, node: str, kept: Sequence[ParameterDescriptor], wanted: Sequence[str], values: Sequence[Any]
+    ) -> None:
+        descriptors = {d.name: d for d in kept}
+        self._controls[node] = [
+            _control(node, descriptors[name], parameter_value_to_python(value))
+            for name, value in zip(wanted, values, strict=True)
+        ]
+
+
+def _control(node: str, descriptor: ParameterDescriptor, value: Value) -> Control:
+    ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
+    low, high = (ranges[0].from_value, ranges[0].to_value) if ranges else (-1e12, 1e12)
+    return Control(node, descriptor.name, descriptor.description, value, low, high)
+
+
+def _names(topic: topics.Topic) -> tuple[str, ...]:
+    return topic.names if topic.type == topics.JOINT else topic.names[:1]
+
+
+def _read_pressure(data: bytes) -> tuple[int, tuple[float, ...]]:
+    stamp, value = decode_pressure(data)
+    return stamp, (value,)

@@ -1,0 +1,249 @@
+"""Make one case: draw the rig, size the effect to its grade, simulate three logs, write them and the label."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.twin.catalogue import Applied, get
+from pneumo_ros.twin.draw import drawn_rig, real_twin, scenes
+from pneumo_ros.twin.gauge import NUISANCE, Null, null_of, quick_gap, refit
+from pneumo_ros.twin.log import write_log
+from pneumo_ros.twin.parameters import TwinRig
+from pneumo_ros.twin.plan import Planned
+from pneumo_ros.twin.scene import Scene, Session, inside_bounds, observation, play
+
+Logs = NDArray[np.float64]
+LOGS = ("fit", "holdout", "edit")
+EPOCH_NS = 1_760_900_000_000_000_000
+GRADE_TOLERANCE = 0.04  # relative
+QUICK_TRIES, CAREFUL_TRIES = 5, 9
+RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What every case shares: the nominal rig and its plant, the ruler of the grades."""
+
+    nominal: Rig
+    car: HalfCar
+    references: tuple[float, float]
+
+
+def bench() -> Bench:
+    """The nominal rig that ships with the package."""
+    nominal = load_rig()
+    car, trim = nominal_half_car(nominal)
+    return Bench(nominal, replace(car, step=RULER_STEP), trim.pressures)
+
+
+@dataclass(frozen=True)
+class Graded:
+    """An effect at the size that meets its grade, as far as a sane size can."""
+
+    size: float
+    gap: float
+    ratio: float
+    applied: tuple[Applied, ...]
+
+
+def made(case: Planned, folder: Path, labels: Path) -> Path:
+    """Make a case: ``folder/<name>/{fit,holdout,edit}.mcap`` and ``labels/<name>.json``; nothing half-made is left.
+
+    A case whose folder exists is finished and kept.
+    """
+    final = folder / case.name
+    if final.exists() and (labels / f"{case.name}.json").exists():
+        return final
+    part = folder / f"{case.name}.part"
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    label, sessions, configs = simulated(case, bench())
+    for i, name in enumerate(LOGS):
+        write_log(
+            part / f"{name}.mcap", sessions[i], configs[i], EPOCH_NS + (100 * (case.seed % 10**6) + 20 * i) * 10**9
+        )
+    labels.mkdir(parents=True, exist_ok=True)
+    (labels / f"{case.name}.json").write_text(json.dumps(label, indent=1), encoding="utf-8")
+    shutil.rmtree(final, ignore_errors=True)
+    part.rename(final)
+    return final
+
+
+def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
+    """Label, the three sessions and what the config of each says."""
+    rng = np.random.default_rng(case.seed)
+    drawn, sigmas = drawn_rig(on.nominal, rng)
+    twin = real_twin(drawn, on.nominal, on.references, rng)
+    fit, held, edit = (_rideable(scene, twin, on) for scene in scenes(rng, case.imperfect))
+    effect_seed = int(rng.integers(1, 2**31))
+    null = null_of(on.car, observation(play(twin, on.nominal, fit, on.car.surface), on.nominal))
+    graded = _graded(case, twin, fit, null, effect_seed, on)
+    rig, road_gain = _combined(twin, graded.applied)
+    held, shown, held_floor = _telling(held, twin, rig, road_gain, 0.5 * case.grade, on)
+    three = (fit, held, edit)
+    sessions = [play(rig, on.nominal, scene, on.car.surface, road_gain) for scene in three]
+    label = {
+        "case": case.name,
+        "kind": case.kind,
+        "truth": _truth(case, graded),
+        "grade": case.grade,
+        "ratio": {"fit": graded.ratio, "holdout": shown / held_floor},
+        "gap": {"fit": graded.gap, "holdout": shown, "floor_fit": null.gap, "floor_holdout": held_floor},
+        "withheld": list(case.withhold),
+        "seed": case.seed,
+        "tolerances_sigma": sigmas,
+        "scenes": [asdict(scene) for scene in three],
+    }
+    return label, sessions, [_config(on.nominal, scene) for scene in three]
+
+
+def _config(nominal: Rig, scene: Scene) -> Rig:
+    """The rig file of a log: nominal, with the change that is known to have been made."""
+    return nominal.with_values(
+        sprung_mass=nominal.sprung_mass.value + scene.added_mass,
+        supply_pressure=nominal.supply_pressure.value + scene.supply_change,
+    )
+
+
+def _rideable(scene: Scene, twin: TwinRig, on: Bench) -> Scene:
+    """The scene with its road lowered until tyres stay loaded and springs inside their table."""
+    for _ in range(12):
+        if inside_bounds(on.car, play(twin, on.nominal, scene, on.car.surface)):
+            return scene
+        scene = replace(scene, gain=0.87 * scene.gain, valve_size=0.95 * scene.valve_size)
+    return scene
+
+
+def _telling(
+    held: Scene, twin: TwinRig, rig: TwinRig, road_gain: float, wanted: float, on: Bench
+) -> tuple[Scene, float, float]:
+    """The held-out scene, changed if it would hardly show the effect; with the gap in it and its null floor.
+
+    An effect that acts only beyond a height, a speed or a step must happen in the held-out log too, or nobody could
+    check a diagnosis on it. Tried in turn: as drawn, then with valve steps and a rougher road; else the most telling.
+    """
+    best: tuple[Scene, float, float] | None = None
+    for gain in (1.0, 1.35, 1.8):
+        scene = held if gain == 1.0 else replace(held, valves="steps", gain=gain * held.gain)
+        floor, start = _refitted(play(twin, on.nominal, scene, on.car.surface), on)
+        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, start)[0]
+        if best is None or (math.isfinite(value) and value / floor > best[1] / best[2]):
+            best = (scene, value, floor)
+        if value / floor >= wanted:
+            break
+    assert best is not None  # the loop has run
+    return best
+
+
+def _refitted(session: Session, on: Bench, start: Logs | None = None) -> tuple[float, Logs]:
+    """What the nominal structure leaves after the refit, and the refit's parameters; infinite if the rig ran away."""
+    seen = observation(session, on.nominal)
+    if not np.isfinite(seen.measured).all():
+        return math.inf, np.zeros(len(NUISANCE))
+    return refit(on.car, seen, start)
+
+
+def _applied(case: Planned, twin: TwinRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
+    out, rig = [], twin
+    for i, ((name, side), size) in enumerate(zip(case.effects, sizes, strict=True)):
+        done = get(name).apply(rig, size, side, np.random.default_rng([seed, i]))
+        rig = done.rig
+        out.append(done)
+    return tuple(out)
+
+
+def _combined(twin: TwinRig, applied: tuple[Applied, ...]) -> tuple[TwinRig, float]:
+    if not applied:
+        return twin, 1.0
+    return applied[-1].rig, max(item.road_gain for item in applied)
+
+
+def _graded(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
+    """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
+    sizes = []
+    for i in range(len(case.effects)):
+        alone = replace(case, effects=(case.effects[i],))
+        sizes.append(case.size or _search(alone, twin, scene, null, seed, on))
+    applied = _applied(case, twin, tuple(sizes), seed)
+    rig, road_gain = _combined(twin, applied)
+    value = null.gap
+    if applied:
+        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
+    return Graded(max(sizes, default=0.0), value, value / null.gap, applied)
+
+
+def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> float:
+    """Size whose refit gap is ``case.grade`` floors: the quick ruler finds the neighbourhood, the refit decides."""
+
+    def ratio_at(size: float, careful: bool) -> float:
+        rig, road_gain = _combined(twin, _applied(case, twin, (size,), seed))
+        session = play(rig, on.nominal, scene, on.car.surface, road_gain)
+        return _left(session, null, on, careful) / null.gap
+
+    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)[0]
+
+
+def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
+    """(size, how far off its ratio is): false position on log(excess over the floor) against log(size)."""
+    wanted = 0.5 * math.log(grade**2 - 1.0)
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    size, best, closest = start, start, math.inf
+    for _ in range(tries):
+        ratio = ratio_at(size)
+        off = abs(ratio / grade - 1.0)
+        if off < closest:
+            best, closest = size, off
+        if off < GRADE_TOLERANCE or (size >= 1.0 and ratio < grade):
+            break
+        excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
+        if excess < wanted:
+            low = (math.log(size), excess)
+        else:
+            high = (math.log(size), excess)
+        size = _next_size(low, high, wanted)
+    return best, closest
+
+
+def _left(session: Session, null: Null, on: Bench, careful: bool) -> float:
+    if careful:
+        return _refitted(session, on, null.logs)[0]
+    seen = observation(session, on.nominal)
+    return quick_gap(on.car, seen, null) if np.isfinite(seen.measured).all() else math.inf
+
+
+def _next_size(low: tuple[float, float] | None, high: tuple[float, float] | None, wanted: float) -> float:
+    if low is not None and high is not None:
+        share = (wanted - low[1]) / max(high[1] - low[1], 1e-9)
+        share = min(max(share, 0.15), 0.85)
+        return math.exp(low[0] + share * (high[0] - low[0]))
+    known = low if low is not None else high
+    assert known is not None  # the caller has just set one of them
+    step = min(max(wanted - known[1], -2.5), 2.5)
+    return min(1.0, math.exp(known[0] + 1.1 * step))
+
+
+def _truth(case: Planned, graded: Graded) -> list[dict[str, Any]]:
+    return [
+        {
+            "effect": name,
+            "side": side,
+            "places": list(done.places),
+            "parameters": {key: {"value": value, "unit": unit} for key, (value, unit) in done.parameters.items()},
+            "comparable": get(name).comparable,
+        }
+        for (name, side), done in zip(case.effects, graded.applied, strict=True)
+    ]

@@ -1,0 +1,72 @@
+"""Forces between body, axle and ground that the nominal rig does not have: friction, bellows, stop, tyre."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.twin.parameters import End
+
+
+@njit(cache=True)
+def lugre_level(height: float, end: End) -> float:
+    """Share of the friction level that acts at a height: 1, unless the guide binds only beyond ``bind_height``."""
+    if end.bind_length <= 0.0:
+        return 1.0
+    return min(max((height - end.bind_height) / end.bind_length, 0.0), 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def lugre(bristle: float, speed: float, end: End) -> tuple[float, float]:
+    """Friction force, N (against positive ``speed``), and the bristle's rate, m/s.
+
+    Canudas de Wit, Olsson, Astrom, Lischinsky: A new model for control of systems with friction, IEEE TAC 40 (1995).
+    The bristle's damping fades with speed, as they advise, so that the model stays dissipative.
+    """
+    fade = math.exp(-((speed / end.stribeck) ** 2))
+    steady = end.coulomb + (end.static - end.coulomb) * fade
+    rate = speed - end.bristle_stiffness * abs(speed) / steady * bristle
+    return end.bristle_stiffness * bristle + end.bristle_damping * fade * rate, rate
+
+
+@njit(cache=True, error_model="numpy")
+def bouc_wen_rate(memory: float, speed: float, end: End) -> float:
+    """Rate of the hysteretic displacement, m/s: elastic below ``bouc_yield``, slipping above it (Wen 1976)."""
+    use = abs(memory / end.bouc_yield) ** end.bouc_power
+    towards = 1.0 if memory * speed > 0.0 else 0.0
+    return speed * (1.0 - towards * use)
+
+
+@njit(cache=True)
+def hunt_crossley(height: float, speed: float, end: End) -> float:
+    """Force of a rubber stop below ``contact_height``, N, pushing the ends apart and never pulling them together.
+
+    Hunt, Crossley: Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42 (1975).
+    """
+    depth = end.contact_height - height
+    if end.contact_stiffness <= 0.0 or depth <= 0.0:
+        return 0.0
+    return max(0.0, end.contact_stiffness * depth**1.5 * (1.0 - end.contact_damping * speed))
+
+
+@njit(cache=True)
+def tyre_force(deflection: float, rate: float, static: float, end: End) -> float:
+    """Force on the axle, N upwards.
+
+    Parameters
+    ----------
+    deflection, rate : road minus axle height, m and m/s
+    static : deflection at rest, m: the hardening is cubic about it, so that it leaves the trim alone
+    """
+    about = deflection - static
+    force = end.tyre_stiffness * (deflection + end.tyre_hardening * about**3) + end.tyre_damping * rate
+    if end.unilateral <= 0.0:
+        return force
+    return 0.0 if deflection <= 0.0 else max(0.0, force)
+
+
+@njit(cache=True)
+def viscous(speed: float, end: End) -> float:
+    """Damping force of the bushing against ``speed``, N."""
+    return (end.damping + end.extra_damping + end.quadratic_damping * abs(speed)) * speed

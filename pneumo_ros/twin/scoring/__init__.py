@@ -1,0 +1,1 @@
+"""Scores of a diagnosis on sealed cases: reads labels and diagnosis.json, nothing else."""

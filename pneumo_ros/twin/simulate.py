@@ -1,0 +1,203 @@
+"""Runs the richer rig: RK4 at a fixed step, valves and controller in the loop, sensors sampled every period."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pneumo_ros.plant.air_spring import AreaSurface
+from pneumo_ros.twin.air import sonic_mass
+from pneumo_ros.twin.controller import Controller, control
+from pneumo_ros.twin.derivative import FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE, SPOOL, TANK, derivative
+from pneumo_ros.twin.parameters import End, Frame, TwinRig
+from pneumo_ros.twin.valve import delayed, spool_target
+from pneumo_ros.units import GRAVITY
+
+STEP = 0.25e-3  # s: a bristle that gives way at 0.2 mm and 0.3 m/s has a rate of 1500/s
+
+
+class Rest(NamedTuple):
+    """Where a run starts and what its valves do at rest.
+
+    Attributes
+    ----------
+    state : (SIZE,)
+    inlets, outlets : openings, m2
+    """
+
+    state: NDArray[np.float64]
+    inlets: tuple[float, float]
+    outlets: tuple[float, float]
+
+
+class Run(NamedTuple):
+    """What came out: N periods, N + 1 samples.
+
+    Attributes
+    ----------
+    states : (N + 1, SIZE)
+    measured : (N + 1, 6) sprung front and rear, unsprung front and rear [m], pressures [Pa]; noise included
+    inlets : (N + 1, 2) commanded openings, m2; row k holds from sample k on
+    """
+
+    states: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    inlets: NDArray[np.float64]
+
+
+@njit(cache=True)
+def _start_end(x: NDArray[np.float64], at: int, index: int, arm: float, unsprung: float, inlet: float, end: End,
+               frame: Frame) -> None:  # fmt: skip
+    height = x[0] + arm * x[1] - unsprung
+    x[at + MODE] = height
+    x[at + SPOOL] = inlet
+    x[at + MASS] = sonic_mass(x[index], height, end, frame)
+    x[at + GAUGE] = x[index]
+
+
+def initial_state(core: NDArray[np.float64], inlets: tuple[float, float], rig: TwinRig) -> NDArray[np.float64]:
+    """Complete a plant state (10,) with the extras at rest, (SIZE,)."""
+    x = np.zeros(SIZE)
+    x[:10] = core
+    _start_end(x, FRONT, 8, rig.front.arm, x[2], inlets[0], rig.front, rig.frame)
+    _start_end(x, REAR, 9, rig.rear.arm, x[3], inlets[1], rig.rear, rig.frame)
+    x[TANK] = rig.frame.supply_pressure
+    if rig.frame.loose_mass > 0.0:
+        x[LOOSE] = x[0] + rig.frame.loose_arm * x[1] - GRAVITY / rig.frame.loose_frequency**2
+    return x
+
+
+@njit(cache=True)
+def _sense_height(true: float, memory: NDArray[np.float64], slot: int, end: End) -> float:
+    """LVDT on the body: play of its rod end, then scale, offset and curvature."""
+    memory[slot] = min(max(memory[slot], true - end.sprung_play), true + end.sprung_play)
+    seen = memory[slot]
+    stroke = seen - end.sprung_centre
+    return end.sprung_scale * seen + end.sprung_offset + end.sprung_curve * stroke * stroke
+
+
+@njit(cache=True)
+def _sense(
+    x: NDArray[np.float64], memory: NDArray[np.float64], noise: NDArray[np.float64], front: End, rear: End
+) -> tuple[float, float, float, float, float, float]:
+    pf = x[FRONT + GAUGE] if front.pressure_frequency > 0.0 else x[8]
+    pr = x[REAR + GAUGE] if rear.pressure_frequency > 0.0 else x[9]
+    return (
+        _sense_height(x[0] + front.arm * x[1], memory, 0, front) + noise[0],
+        _sense_height(x[0] + rear.arm * x[1], memory, 1, rear) + noise[1],
+        front.unsprung_scale * x[2] + front.unsprung_offset + noise[2],
+        rear.unsprung_scale * x[3] + rear.unsprung_offset + noise[3],
+        front.pressure_scale * pf + front.pressure_offset + noise[4],
+        rear.pressure_scale * pr + rear.pressure_offset + noise[5],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def run(
+    x0: NDArray[np.float64],
+    road: NDArray[np.float64],
+    shake: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    rest_inlets: tuple[float, float],
+    outlets: tuple[float, float],
+    static: tuple[float, float],
+    period: float,
+    steps: int,
+    gains: Controller,
+    frame: Frame,
+    front: End,
+    rear: End,
+    surface: AreaSurface,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Simulate N periods.
+
+    Parameters
+    ----------
+    x0 : (SIZE,)
+    road : (N + 1, 2) commanded ground, m, linear between samples
+    shake : (N + 1, 2) relative excitation added to each inlet command (share of its opening at rest)
+    noise : (N + 1, 6) sensor noise, m and Pa
+    rest_inlets, outlets : openings at rest and of the constant outlets, m2
+    static : tyre deflections at rest, m
+    period, steps : s, and RK4 steps in it
+    """
+    count = road.shape[0] - 1
+    states, measured, inlets = np.empty((count + 1, SIZE)), np.empty((count + 1, 6)), np.empty((count + 1, 2))
+    x, probe = x0.copy(), x0.copy()
+    k1, k2, k3, k4 = np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE)
+    play = np.array([x[0] + front.arm * x[1], x[0] + rear.arm * x[1]])
+    seen = _sense(x, play, noise[0] * 0.0, front, rear)
+    memory_front, memory_rear = np.array([seen[0] - seen[2], 0.0]), np.array([seen[1] - seen[3], 0.0])
+    dt, duration = period / steps, period * count
+    held_front, held_rear = rest_inlets
+    for i in range(count + 1):
+        seen = _sense(x, play, noise[i], front, rear)
+        for m in range(6):
+            measured[i, m] = seen[m]
+        states[i] = x
+        uf = control(memory_front, seen[0] - seen[2], front.design_height, rest_inlets[0], period, gains)
+        ur = control(memory_rear, seen[1] - seen[3], rear.design_height, rest_inlets[1], period, gains)
+        inlets[i, 0] = min(max(uf + rest_inlets[0] * shake[i, 0], 0.0), gains.limit)
+        inlets[i, 1] = min(max(ur + rest_inlets[1] * shake[i, 1], 0.0), gains.limit)
+        if i == count:
+            break
+        slopes = ((road[i + 1, 0] - road[i, 0]) / period, (road[i + 1, 1] - road[i, 1]) / period)
+        for j in range(steps):
+            t = (i * steps + j) * dt
+            cf = delayed(inlets[: i + 1, 0], t, front.valve_delay, period)
+            cr = delayed(inlets[: i + 1, 1], t, rear.valve_delay, period)
+            held_front = spool_target(cf, cr, rest_inlets[1], held_front, dt, front)
+            held_rear = spool_target(cr, cf, rest_inlets[0], held_rear, dt, rear)
+            spools = (held_front, held_rear)
+            r0 = (road[i, 0] + slopes[0] * j * dt, road[i, 1] + slopes[1] * j * dt)
+            rm = (r0[0] + 0.5 * dt * slopes[0], r0[1] + 0.5 * dt * slopes[1])
+            r1 = (r0[0] + dt * slopes[0], r0[1] + dt * slopes[1])
+            derivative(x, k1, t, duration, spools, outlets, r0, slopes, static, frame, front, rear, surface)
+            for m in range(SIZE):
+                probe[m] = x[m] + 0.5 * dt * k1[m]
+            derivative(
+                probe, k2, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface
+            )
+            for m in range(SIZE):
+                probe[m] = x[m] + 0.5 * dt * k2[m]
+            derivative(
+                probe, k3, t + 0.5 * dt, duration, spools, outlets, rm, slopes, static, frame, front, rear, surface
+            )
+            for m in range(SIZE):
+                probe[m] = x[m] + dt * k3[m]
+            derivative(probe, k4, t + dt, duration, spools, outlets, r1, slopes, static, frame, front, rear, surface)
+            for m in range(SIZE):
+                x[m] += dt / 6.0 * (k1[m] + 2.0 * (k2[m] + k3[m]) + k4[m])
+    return states, measured, inlets
+
+
+def simulate(
+    rig: TwinRig,
+    rest: Rest,
+    road: NDArray[np.float64],
+    shake: NDArray[np.float64],
+    noise: NDArray[np.float64],
+    surface: AreaSurface,
+    gains: Controller,
+    period: float,
+) -> Run:
+    """One session from rest; arguments as :func:`run`."""
+    return Run(
+        *run(
+            rest.state,
+            np.ascontiguousarray(road, dtype=float),
+            np.ascontiguousarray(shake, dtype=float),
+            np.ascontiguousarray(noise, dtype=float),
+            rest.inlets,
+            rest.outlets,
+            (-float(rest.state[2]), -float(rest.state[3])),
+            period,
+            max(1, round(period / STEP)),
+            gains,
+            *rig,
+            surface,
+        )
+    )

@@ -1,0 +1,91 @@
+"""Batches of the blind check survive killed workers, locally and on a real Dask cluster; finished cases are kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from pneumo_ros.cli.blind_batch import run_all
+from pneumo_ros.cli.blind_work import make_case
+from pneumo_ros.errors import InputError
+from pneumo_ros.session.reading import read_log
+from pneumo_ros.twin.plan import plan
+
+CASES = plan("ci")[:3]
+
+
+def die_once(folder: str) -> None:
+    """Kill the own process the first time, succeed the second."""
+    marker = Path(folder) / "tried"
+    if not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    (Path(folder) / "done").touch()
+
+
+def fail(folder: str) -> None:
+    """A piece of work that goes wrong."""
+    raise ValueError(folder)
+
+
+def test_a_killed_local_worker_costs_a_restart_only(tmp_path: Path) -> None:
+    outcomes = dict(run_all(die_once, [str(tmp_path)], workers=2))
+    assert outcomes == {str(tmp_path): ""}
+    assert (tmp_path / "done").exists()
+
+
+def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path: Path) -> None:
+    (tmp_path / "tried").touch()
+    assert list(run_all(fail, ["x", "y"])) == [("x", "ValueError: x"), ("y", "ValueError: y")]
+    assert list(run_all(die_once, [str(tmp_path)])) == [(str(tmp_path), "")]
+
+
+def test_no_scheduler_is_one_line() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no scheduler answers"):
+        list(run_all(fail, ["x"], scheduler="tcp://127.0.0.1:1"))
+
+
+@pytest.mark.slow
+def test_three_cases_on_a_dask_cluster_with_a_worker_killed(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        pids = [worker.pid for worker in cluster.workers.values()]
+        killer = threading.Thread(target=_kill_when_busy, args=(pids[0], tmp_path / "cases"))
+        killer.start()
+        items = [(case, str(tmp_path)) for case in CASES]
+        outcomes = dict(run_all(make_case, items, scheduler=cluster.scheduler_address))
+        killer.join()
+        assert pids[0] not in [worker.pid for worker in cluster.workers.values()]
+    assert sorted(item[0].name for item in outcomes) == sorted(case.name for case in CASES)
+    assert set(outcomes.values()) == {""}
+    _assert_complete(tmp_path)
+
+
+def _kill_when_busy(pid: int, cases: Path) -> None:
+    """SIGKILL a worker once cases are being made and none is finished."""
+    deadline = time.monotonic() + 120.0
+    while len(list(cases.glob("*.part"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(pid, signal.SIGKILL)
+
+
+def _assert_complete(folder: Path) -> None:
+    assert not list((folder / "cases").glob("*.part"))
+    for case in CASES:
+        label = json.loads((folder / "labels" / f"{case.name}.json").read_text())
+        assert label["case"] == case.name
+        for name in ("fit", "holdout", "edit"):
+            log = read_log(folder / "cases" / case.name / f"{name}.mcap")
+            assert log.config is not None
+            assert log.topics["/road/profile"].count == 7500
+    before = {path: path.stat().st_mtime for path in (folder / "cases").rglob("*.mcap")}
+    assert all(error == "" for _, error in run_all(make_case, [(case, str(folder)) for case in CASES]))
+    after = {path: path.stat().st_mtime for path in (folder / "cases").rglob("*.mcap")}
+    assert before == after, "finished cases are not made again"
