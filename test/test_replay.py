@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import pty
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -36,7 +40,8 @@ from pneumo_ros.nodes.base import StopRequest  # noqa: E402
 from pneumo_ros.nodes.controller import ControllerNode  # noqa: E402
 from pneumo_ros.nodes.estimator import EstimatorNode  # noqa: E402
 from pneumo_ros.nodes.plant import PlantNode  # noqa: E402
-from pneumo_ros.nodes.replay import Player, recorded_qos, transport_of  # noqa: E402
+from pneumo_ros.nodes.qos import recorded_qos  # noqa: E402
+from pneumo_ros.nodes.replay import Player, transport_of  # noqa: E402
 from pneumo_ros.nodes.road_profile import RoadProfileNode  # noqa: E402
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode  # noqa: E402
 from pneumo_ros.nodes.spin import make_executor, spin  # noqa: E402
@@ -289,3 +294,21 @@ def test_live_replay_feeds_a_running_estimator(recorded: Log, context: Context) 
     finally:
         player.node.destroy_node()
         listener.close()
+
+
+def test_live_replay_from_the_command_line(recorded: Log) -> None:
+    """To the end without a terminal; with one, keys act and `q` ends it."""
+    result = run(app, [str(recorded.path), "--rate", "50", "--domain-id", str(own_domain())])
+    assert result.exit_code == 0, result.output
+    inputs = ("/road/profile", "/rig/displacement", "/rig/front/pressure", "/rig/rear/pressure")
+    published = sum(recorded.topics[name].count for name in inputs)
+    assert f"{published} messages, late by p50" in " ".join(result.output.split())
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "replay", str(recorded.path), "--paused"]
+    process = subprocess.Popen([*command, "--domain-id", str(own_domain())], stdin=theirs, stdout=subprocess.PIPE)
+    assert process.stdout is not None and b"space: pause" in process.stdout.readline()
+    for key in (b".", b"+", b";", b" ", b"q"):
+        os.write(ours, key)
+    assert process.wait(30) == 0
+    os.close(ours)
+    os.close(theirs)
