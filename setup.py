@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 NAME = "pneumo_ros"
 
 # Every node is an executable of its own: `ros2 run pneumo_ros <name>`, and a console script under pip.
-NODES = ["road_profile", "plant", "estimator", "controller", "session_recorder"]
+NODES = ["road_profile", "plant", "daq", "estimator", "controller", "session_recorder"]
 
 # One list of wheels for those who have no ROS 2 installed; a sourced ROS keeps its own.
 ROS_WHEELS = [

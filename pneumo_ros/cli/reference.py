@@ -16,7 +16,9 @@ TOPICS_HEAD = """# Topics
 
 Made from the table in `pneumo_ros/session/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
 the instant its values hold. `JointState` is used as the stamped, named standard message: its `position` holds the value
-in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position.
+in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position. On
+hardware (`pneumo run --source serial`) the node `daq` takes the place of `plant`: it publishes what the sensors of the
+real rig say under the same names.
 
 """
 PARAMETERS_HEAD = """# Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -64,3 +65,13 @@ def timing_table(summary: Summary) -> Table:
 def _milliseconds(values: dict[str, str], key: str) -> str:
     value = float(values.get(key, "nan")) / 1e3
     return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
+
+
+def simple_table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Table:
+    """Texts in columns, the first to the left and the others to the right."""
+    table = Table(box=box.SIMPLE)
+    for number, column in enumerate(columns):
+        table.add_column(column, justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*row)
+    return table

@@ -20,6 +20,7 @@ from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.daq.scaling import check_map, output_scale
 from pneumo_ros.daq.stream import StreamDecoder
 from pneumo_ros.errors import InputError
+from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
 
 HELLO_EVERY = SECOND // 5  # between handshake attempts
@@ -58,6 +59,8 @@ class DriverCore:
         discard: Callable[[], None] = lambda: None,
     ) -> None:
         self.safety, self.calibration, self.rig = safety, calibration, rig
+        self._surface = load_surface()
+        effective_area(rig.design_height.value, 1e5, self._surface)  # loads the compiled code before it is urgent
         self.phase = Phase.CLOSED
         self.decoder = StreamDecoder()
         self.actuation = Actuation(safety, send, discard)
@@ -154,7 +157,7 @@ class DriverCore:
             self.phase = Phase.REFUSED
             self._finding_event(Finding(Reason.BOARD_REFUSED, "board", str(error)), now)
             return
-        self.intake = Intake(hello, self.calibration, self.safety, self.rig)
+        self.intake = Intake(hello, self.calibration, self.safety, self.rig, self._surface)
         self.actuation.board(scale)
         self.phase, self.status, self.last = Phase.RUNNING, None, None
         self._last_sample, self._silent = now, False
@@ -283,7 +286,7 @@ class DriverCore:
             self._make_safe(finding, now)
         elif now - self._last_complaint >= COMPLAINT_EVERY:
             self._last_complaint = now
-            self._finding_event(finding, now)
+            self._finding_event(finding._replace(level=Level.WARN), now)  # an error once the driver trips over it
 
     def blockers(self, now: int) -> list[str]:
         """Why the valves cannot be armed; empty if they can."""

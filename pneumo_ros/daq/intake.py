@@ -13,6 +13,7 @@ from pneumo_ros.daq.plausibility import PlausibilityMonitor
 from pneumo_ros.daq.reasons import Finding, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.daq.scaling import input_scale
+from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.rig import Rig
 
 WRAP = 1 << 32
@@ -50,10 +51,13 @@ class Intake:
     ----------
     hello : the board
     calibration, safety, rig : configuration
+    surface : effective area, already loaded: nothing may wait once the samples come
     """
 
-    def __init__(self, hello: Hello, calibration: Calibration, safety: SafetyConfig, rig: Rig) -> None:
-        self.hello, self.rig, self._safety = hello, rig, safety
+    def __init__(
+        self, hello: Hello, calibration: Calibration, safety: SafetyConfig, rig: Rig, surface: AreaSurface
+    ) -> None:
+        self.hello, self.rig, self._safety, self._surface = hello, rig, safety, surface
         self.clock = DeviceClock()
         self.limits = LimitMonitor(safety.limits)
         self.samples = self.lost = self.out_of_step = 0
@@ -76,7 +80,7 @@ class Intake:
         self.calibration = calibration
         self.scale = input_scale(calibration, self.hello, self.rig.ambient_pressure.value)
         period = self.hello.sample_period_us * 1e-6
-        self.plausibility = PlausibilityMonitor(self._safety.plausibility, self.scale, self.rig, period)
+        self.plausibility = PlausibilityMonitor(self._safety.plausibility, self.scale, self.rig, period, self._surface)
         self.limits.reset()
 
     def take(self, sample: Sample, arrival_ns: int) -> tuple[Measurement | None, list[Finding]]:

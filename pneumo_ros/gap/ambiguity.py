@@ -20,8 +20,8 @@ def ambiguity_group(
     """Ids in the verdict's group, the verdict's first; empty for none and unknown.
 
     A rival belongs to it when its own best fit does nearly what the verdict's does: its trajectory is within
-    :data:`ANGLE` of it (what it fails to explain, over what there was to explain) and the selection blocks do not tell them
-    apart (two standard errors, or :data:`SAME`).
+    :data:`ANGLE` of it (what it fails to explain, over what there was to explain) and the selection blocks do not tell
+    them apart (two standard errors, or :data:`SAME`).
     """
     if opinion.verdict in ("none", "unknown"):
         return ()
@@ -38,7 +38,9 @@ def ambiguity_group(
 
 
 def angle(problem: Problem, chosen: Scored, rival: Scored) -> float:
-    """Degrees between what the two structures add to what the nuisance parameters can do, from the rival's shortfall."""
+    """Degrees between what the two structures add to what the nuisance parameters can do, from the rival's
+    shortfall.
+    """
     difference = chosen.fit.residual - rival.fit.residual
     rows = problem.fitted
     whole = float(np.sum((chosen.fit.residual[rows] - _without(problem, chosen)[rows]) ** 2))

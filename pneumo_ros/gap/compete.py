@@ -1,9 +1,9 @@
 """The competition: nominal re-estimated, single effects, pairs; each fitted with every nuisance parameter free.
 
-Cheap screening first (:mod:`pneumo_ros.gap.screen`), short fits of what promises most, then the best to convergence, from
-several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on top of each leading
-single, where the first effect no longer hides it. Whenever the best fit so far is good enough to time the command's jumps
-by (:mod:`pneumo_ros.gap.events`), they are timed and the finalists fitted again.
+Cheap screening first (:mod:`pneumo_ros.gap.screen`), short fits of what promises most, then the best to convergence,
+from several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on top of each
+leading single, where the first effect no longer hides it. Whenever the best fit so far is good enough to time the
+command's jumps by (:mod:`pneumo_ros.gap.events`), they are timed and the finalists fitted again.
 """
 
 from __future__ import annotations
@@ -141,7 +141,9 @@ def _run_pairs(contest: Contest) -> None:
 
 
 def _varied(promised: Sequence[Promise], count: int) -> list[Promise]:
-    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their chance."""
+    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their
+    chance.
+    """
     taken: list[Promise] = []
     for promise in promised:
         if sum(p.parts[0][0] == promise.parts[0][0] for p in taken) < 3:

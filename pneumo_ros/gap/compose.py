@@ -1,4 +1,5 @@
-"""One compiled kernel for a whole library of plant terms: its source is generated, written to a cache and compiled once.
+"""One compiled kernel for a whole library of plant terms: its source is generated, written to a cache and compiled
+once.
 
 Numba cannot cache a function made inside a factory, and a call through a function pointer would cost more than the term
 itself. So the terms' names are written into the source of one module under its content hash; each term is guarded by a
@@ -17,7 +18,7 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -29,7 +30,7 @@ import numba
 from pneumo_ros.gap import kernel_parts
 from pneumo_ros.plant import air_spring, half_car, orifice
 
-Compiled = Callable[..., Any]
+Compiled = Any  # numba ships no types; a dispatcher of module level
 
 CORRECTIONS = (
     "front_force",
@@ -60,7 +61,8 @@ class PlantTerm:
     tyre : (tyre, z, p) -> N, added to the tyre's force (positive upwards on the axle)
     air : (air, z, p) -> Pa/s, added to dP/dt
     supply : (z, p) -> Pa by which the supply has sagged; only for a term of the whole rig
-    shared : the term belongs to the rig, not to one end: advance is (z, air_front, air_rear, dt, p), start (air_front, air_rear, p)
+    shared : the term belongs to the rig, not to one end: advance is (z, air_front, air_rear, dt, p), start (air_front,
+        air_rear, p)
     """
 
     states: int = 0
@@ -94,7 +96,8 @@ def compose(slots: Sequence[Slot]) -> Compiled:
     Signature: (x0 (10,), commands (N, 4), road (N + 1, 2), correction (0 or N, 9), period, steps, body, front, rear,
     surface, on (K, 2) bool, values (K, 2, M)) -> states (N + 1, 10); rows after a divergence are NaN.
     """
-    return _load(_source(slots), tuple(_files(slots))).simulate  # type: ignore[no-any-return]
+    kernel: Compiled = _load(_source(slots), tuple(_files(slots))).simulate
+    return kernel
 
 
 def cache_folder() -> Path:

@@ -11,16 +11,35 @@ import numpy as np
 from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.compete import Contest, Effort, Progress, compete, with_jacobian
 from pneumo_ros.gap.diagnosis import Diagnosis, EditTest, Experiment, Gap, Ranked
-from pneumo_ros.gap.fit import Fit, fit
+from pneumo_ros.gap.fit import Fit, fit, sensitivities
 from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, noise_floor, settle, total_gap
-from pneumo_ros.gap.model import Active, Array, Model
+from pneumo_ros.gap.model import Active, Array, Mask, Model
 from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.selection import Scored, Thresholds, score, select
 from pneumo_ros.gap.uncertainty import covariance, effect_estimates, nuisance_estimates
 from pneumo_ros.gap.verdict import Calibration, Opinion, judge, name_of
 
-Locate = Callable[[Model, Sequence[Any], Any, Array, Sequence[Active]], Mapping[str, float]]
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """What flexible corrections on top of a structure say about the places of what it leaves.
+
+    Attributes
+    ----------
+    shares : (place, share of the held-out residual), largest first
+    left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
+    mendable : the same once the right places get a flexible correction
+    flat : noise, tolerances and model form explain what is left
+    """
+
+    shares: tuple[tuple[str, float], ...]
+    left: float
+    mendable: float
+    flat: bool
+
+
+Locate = Callable[[Any, Sequence[Any], Any, Array, Sequence[Active]], Whereabouts]
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
 
 
@@ -34,7 +53,7 @@ class Options:
     effort : how many candidates are fitted
     limits : what counts as evidence
     calibration : constants of the probabilities
-    locate : (model, fit logs, held-out log, nuisance, active) -> held-out gap when one place gets a flexible correction
+    locate : (model, fit logs, held-out log, nuisance, active) -> :class:`Whereabouts` of what that structure leaves
     experiment : design the experiment that splits an ambiguity group
     """
 
@@ -58,7 +77,7 @@ class HeldOut:
 def diagnose(
     model: Model,
     fit_logs: Sequence[Any],
-    holdout: Any | None = None,
+    holdout: Any,
     options: Options | None = None,
     progress: Progress | None = None,
     edit: Any | None = None,
@@ -69,16 +88,13 @@ def diagnose(
     ----------
     model : :class:`pneumo_ros.gap.rig_model.RigModel` for the half car
     fit_logs : records to fit, see :class:`pneumo_ros.gap.model.Record`
-    holdout : record that nothing is fitted to; None: the last third of the last fit log (and a note says so)
+    holdout : record that nothing is fitted to
     progress : called with the share done and what is being done
     edit : a record of the rig after a known change, predicted without refitting
     """
     options = options or Options()
     tell = progress or (lambda share, what: None)
     notes: list[str] = []
-    if holdout is None:
-        fit_logs, holdout = split_by_time(fit_logs)
-        notes.append("no held-out log was given: the end of the fit log is held out, which tests less")
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
     tell(0.9, "selecting and checking on the held-out log")
     problem = contest.problem
@@ -86,7 +102,20 @@ def diagnose(
     finalists = [score(problem, f) for f in contest.finalists]
     chosen = select(refit, finalists, options.limits)
     opinion = judge(refit, finalists, chosen, options.limits, options.calibration)
-    return _report(problem, contest, opinion, refit, finalists, holdout, options, tell, notes, edit)
+    found = _report(problem, contest, opinion, refit, finalists, holdout, options, tell, notes, edit)
+    return _within_limits(found, [*fit_logs, holdout])
+
+
+def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
+    """What the logs' own limitations leave of the verdict."""
+    limitations = [(r.name, one) for r in records for one in getattr(r, "limitations", ())]
+    if not limitations:
+        return found
+    notes = (*found.notes, *dict.fromkeys(f"{name}: {one.text}" for name, one in limitations))
+    cap = min(one.cap for _, one in limitations)
+    blocked = any(getattr(r, "blocked", False) for r in records)
+    verdict = "not_testable" if blocked else found.verdict
+    return replace(found, verdict=verdict, probability=min(found.probability, cap), notes=notes)
 
 
 def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
@@ -127,7 +156,8 @@ def _report(
     group = ambiguity_group(problem, opinion, finalists, options.limits)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
     tell(0.95, "locating")
-    location = _location(problem, opinion, holdout, nuisance, active, runs, options)
+    before, after = _whereabouts(problem, base, best, holdout, options)
+    location = _location(problem, opinion, holdout, nuisance, active, runs, before if best is base else after)
     experiment = None
     if options.experiment is not None and len(group) > 1:
         tell(0.97, "designing the next experiment")
@@ -148,14 +178,15 @@ def _report(
         edit=None if edit is None else edit_test(problem, edit, base, best),
         notes=tuple(notes),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
+        evidence=_evidence(refit, opinion.chosen, runs, before, after),
         trajectories=_trajectories(holdout, runs),
     )
 
 
-def _final(problem: Problem, one: Fit, rows: Array) -> Fit:
+def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
     """Fitted once more on all blocks, with fresh sensitivities."""
     again = fit(problem, one.candidate, one.x, one.jacobian, rows=rows, iterations=4)
-    return with_jacobian(problem, again)
+    return sensitivities(problem, again)
 
 
 def _held(problem: Problem, one: Fit, holdout: Any) -> HeldOut:
@@ -224,6 +255,19 @@ def side_of(model: Model, candidate: Candidate) -> str | None:
     return sides.pop() if len(sides) == 1 else "both"
 
 
+def _whereabouts(
+    problem: Problem, base: Fit, best: Fit, holdout: Any, options: Options
+) -> tuple[Whereabouts | None, Whereabouts | None]:
+    """Of what the refit leaves, and of what the best named structure leaves."""
+    if options.locate is None:
+        return None, None
+    found = []
+    for one in (base, best) if best is not base else (base,):
+        active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+        found.append(options.locate(problem.model, problem.records, holdout, problem.nuisance(one.x), active))
+    return found[0], found[-1]
+
+
 def _location(
     problem: Problem,
     opinion: Opinion,
@@ -231,19 +275,25 @@ def _location(
     nuisance: Array,
     active: Sequence[Active],
     runs: Mapping[str, HeldOut],
-    options: Options,
+    left: Whereabouts | None,
 ) -> list[tuple[str, float]]:
     """A named effect's own places; else the places where a flexible correction helps."""
     refit, best = runs["refit"].total, runs["best"].total
     if opinion.verdict != "unknown" and active:
         initial = settle(problem.model, holdout, nuisance, active)
         return effect_shares(problem.model, holdout, nuisance, initial, active, max(0.0, 1.0 - best / refit))
-    if options.locate is None:
-        return []
-    gaps = options.locate(problem.model, problem.records, holdout, nuisance, active)
-    closed = {place: max(0.0, 1.0 - (gap / refit) ** 2) for place, gap in gaps.items()}
-    total = max(1.0, sum(closed.values()))
-    return sorted(((place, share / total) for place, share in closed.items() if share > 0.0), key=lambda p: -p[1])
+    return [] if left is None else list(left.shares)
+
+
+def _evidence(
+    refit: Scored, chosen: Scored, runs: Mapping[str, HeldOut], before: Whereabouts | None, after: Whereabouts | None
+) -> dict[str, float]:
+    """Numbers the verdict rests on."""
+    out = {"level_refit": refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    for name, one in (("refit", before), ("chosen", after)):
+        if one is not None:
+            out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
+    return out | {f"gap_{name}": run.total for name, run in runs.items()}
 
 
 def _next_experiment(
@@ -275,7 +325,8 @@ def edit_test(problem: Problem, edit: Any, base: Fit, best: Fit) -> EditTest:
     """Predict a log of the rig after a known change: what the log's configuration states differently is applied to the
     estimates as a factor; nothing is fitted again."""
     model = problem.model
-    factors = getattr(model, "changes", lambda record: {})(edit)
+    changes = getattr(model, "changes", None)
+    factors: dict[str, float] = {} if changes is None else changes(edit)
     scale = np.array([factors.get(p.name, 1.0) for p in model.parameters])
     nominal = np.array([p.nominal for p in model.parameters])
     active = problem.active(best.candidate, problem.values(best.candidate, best.x))
@@ -289,8 +340,3 @@ def edit_test(problem: Problem, edit: Any, base: Fit, best: Fit) -> EditTest:
     ]
     changed = {name: factor for name, factor in factors.items() if factor != 1.0}
     return EditTest(edit.name, changed, *gaps)
-
-
-def with_locate(options: Options, locate: Locate) -> Options:
-    """The options with a way to find places by flexible corrections."""
-    return replace(options, locate=locate)

@@ -9,7 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pneumo_ros.gap.model import Active, Array
+
+ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,9 @@ class Gap:
 
 @dataclass(frozen=True)
 class Experiment:
-    """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals apart."""
+    """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
+    apart.
+    """
 
     name: str
     description: str
@@ -110,9 +116,23 @@ class Experiment:
     road: Array  # (N, 2) m
     valves: Array  # (N, 4) m2
 
+    def write(self, folder: Path) -> list[Path]:
+        """The profile as two tables: a road that ``pneumo run --road`` plays, and the valves' openings."""
+        tables = {
+            ROAD_FILE: ("time_s,front_m,rear_m", self.road),
+            VALVE_FILE: ("time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2", self.valves),
+        }
+        for name, (header, columns) in tables.items():
+            part = folder / f"{name}.part"
+            np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
+            part.replace(folder / name)
+        return [folder / name for name in tables]
+
     def to_json(self) -> dict[str, Any]:
-        """Without the profile, which has a file of its own."""
+        """Without the profile, which has files of its own."""
         return {
+            "text": f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)",
+            "file": ROAD_FILE,
             "name": self.name,
             "description": self.description,
             "separation": self.separation,
@@ -157,6 +177,7 @@ class Diagnosis:
     active : the chosen effects with their values
     not_testable : effects that this excitation could not have shown, with the smallest size it could
     notes : sentences for the reader: limitations, bounds reached, divergences
+    evidence : numbers the verdict rests on
     trajectories : on the held-out rows: "time" (N,), "log", "nominal", "refit", "best" (N, C)
     """
 
@@ -173,6 +194,7 @@ class Diagnosis:
     edit: EditTest | None = None
     notes: tuple[str, ...] = ()
     logs: Mapping[str, Any] = field(default_factory=dict)
+    evidence: Mapping[str, float] = field(default_factory=dict)
     trajectories: Mapping[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
     def to_json(self) -> dict[str, Any]:
@@ -190,9 +212,10 @@ class Diagnosis:
             "next_experiment": None if self.experiment is None else self.experiment.to_json(),
             "edit_test": None if self.edit is None else self.edit.to_json(),
             "notes": list(self.notes),
+            "evidence": dict(self.evidence),
             "logs": dict(self.logs),
         }
-        return _finite(out)  # type: ignore[no-any-return]
+        return dict(_finite(out))
 
 
 def write_json(diagnosis: Diagnosis, path: Path) -> None:

@@ -1,9 +1,10 @@
 """When within a sample did the command jump?
 
-A log holds the command once a sample, but it may be held over a shorter control period: a jump that the log shows at a row
-really happened up to one sample earlier. On a rig this costs about the sensor noise in the free-run error, more than a
-small effect does. The fraction of a sample by which each jump led is estimated, bounded to [0, 1], from the fit logs only,
-after the best candidate is known and for all candidates alike; held-out logs are predicted from what they hold.
+A log holds the command once a sample, but it may be held over a shorter control period: a jump that the log shows at a
+row really happened up to one sample earlier. On a rig this costs about the sensor noise in the free-run error, more
+than a small effect does. The fraction of a sample by which each jump led is estimated, bounded to [0, 1], from the fit
+logs only, after the best candidate is known and for all candidates alike; held-out logs are predicted from what they
+hold.
 """
 
 from __future__ import annotations
@@ -64,7 +65,9 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
             records[k] = model.led(records[k], [event], np.ones(1))
             one = Problem(model, tuple(records), problem.averaged)
             # Measurements and weights stay: only the prediction of this log moves.
-            columns.append(((problem.measured - one.predict(best.candidate, best.x)) * problem.weight - best.residual).ravel())
+            columns.append(
+                ((problem.measured - one.predict(best.candidate, best.x)) * problem.weight - best.residual).ravel()
+            )
     T = np.array(columns).T
     J = best.jacobian.reshape(T.shape[0], -1)
     A = np.concatenate([T, J], axis=1)

@@ -1,8 +1,8 @@
 """Bounded robust least squares on the free-run error, by a projected Levenberg-Marquardt of its own.
 
-The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and its
-samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the weight
-of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
+The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and
+its samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the
+weight of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
 down-weighted (Huber) at a threshold that follows the misfit.
 
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
@@ -15,12 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumo_ros.gap.model import Array
+from pneumo_ros.gap.model import Array, Mask
 from pneumo_ros.gap.problem import Candidate, Problem
 
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
 HUBER = 4.0  # robust sigmas
-STEP = 0.02  # forward difference in scaled units
+STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
+CENTRAL = 0.05  # half width of the central differences
 TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
 NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
 COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
@@ -54,7 +55,7 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Array | slice, x: Array, fixed: int) -> float:
+def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
     """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
     r = residual[rows]
     if not np.all(np.isfinite(r)):
@@ -75,7 +76,7 @@ def fit(
     candidate: Candidate,
     start: Array,
     jacobian: Array | None = None,
-    rows: Array | None = None,
+    rows: Mask | None = None,
     iterations: int = 10,
 ) -> Fit:
     """Best unknowns from one start.
@@ -108,7 +109,7 @@ def fit(
     return state
 
 
-def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Array, spent: int = 0) -> Fit:
+def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
     residual = problem.residual(candidate, x)
     return Fit(candidate, x, cost_of(residual, rows, x, problem.fixed), residual, None, spent + 1)
 
@@ -134,9 +135,20 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     return columns
 
 
-def _step(
-    problem: Problem, state: Fit, rows: Array, bounds: tuple[Array, Array], damping: float
-) -> tuple[Fit, float]:
+def sensitivities(problem: Problem, state: Fit) -> Fit:
+    """The fit with central differences of the full model: for what is reported, where degenerate directions matter."""
+    columns = np.empty((*state.residual.shape, len(state.x)))
+    low, high = problem.bounds(state.candidate)
+    for m in range(len(state.x)):
+        ends = [float(np.clip(state.x[m] + s, low[m], high[m])) for s in (CENTRAL, -CENTRAL)]
+        one = np.arange(len(state.x)) == m
+        up, down = (problem.residual(state.candidate, np.where(one, end, state.x)) for end in ends)
+        column = (up - down) / (ends[0] - ends[1])
+        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+    return replace(state, jacobian=columns)
+
+
+def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float) -> tuple[Fit, float]:
     """The first of a few ever more damped steps that gains."""
     low, high = bounds
     H, g = normal_equations(problem, state, rows)
@@ -152,7 +164,7 @@ def _step(
     return state, damping
 
 
-def normal_equations(problem: Problem, state: Fit, rows: Array) -> tuple[Array, Array]:
+def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, Array]:
     """Curvature and gradient of half the cost at a fit that has its jacobian: (m, m) and (m,)."""
     assert state.jacobian is not None
     r = state.residual[rows]

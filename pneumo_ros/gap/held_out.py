@@ -47,7 +47,9 @@ def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active],
         # A model that is wrong bends the first moments too: its misfit must not be blamed on the initial state.
         strength = 1.0 / max(1.0, float(np.mean(r * r)))
         prior = (state - centre) / std
-        move = bounded_newton(strength * J.T @ J + np.eye(len(state)), strength * J.T @ r + prior, -9.0 - prior, 9.0 - prior)
+        move = bounded_newton(
+            strength * J.T @ J + np.eye(len(state)), strength * J.T @ r + prior, -9.0 - prior, 9.0 - prior
+        )
         state = state + std * move
     return state
 
@@ -66,14 +68,17 @@ def total_gap(per_channel: Array) -> float:
 
 
 def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, seed: int = 1) -> tuple[float, float]:
-    """90 % interval of 1 - gap(best)/gap(refit) by moving blocks of time (Kuensch 1989): both errors drawn together."""
+    """90 % interval of 1 - gap(best)/gap(refit) by moving blocks of time, both errors drawn together.
+
+    Blocks wrap around the end (Politis and Romano 1992), so that no part of the log is drawn less often than another.
+    """
     there = record.weight > 0.0
     scale = scale_of(record) * np.sqrt(np.maximum(there.sum(axis=0), 1))
     squares = [np.sum(np.where(there, (record.measured - y) / scale, 0.0) ** 2, axis=1) for y in (refit, best)]
     if not all(np.all(np.isfinite(s)) for s in squares):
         return (-np.inf, 0.0)
     length = max(1, round(BOOTSTRAP_BLOCK / record.period))
-    sums = [np.convolve(s, np.ones(length), mode="valid") for s in squares]
+    sums = [np.convolve(np.concatenate([s, s[: length - 1]]), np.ones(length), mode="valid") for s in squares]
     rng = np.random.default_rng(seed)
     count = max(1, len(squares[0]) // length)
     starts = rng.integers(0, len(sums[0]), size=(draws, count))

@@ -1,7 +1,7 @@
 """What the diagnosis needs to know of any model: parameters, initial state, effects, and a prediction.
 
-Fitting, selection, ambiguity and verdict use nothing but these protocols, so that another rig (a frame on a shaker, an air
-chamber) is diagnosed by the same code; :mod:`pneumo_ros.gap.rig_model` is the half car's.
+Fitting, selection, ambiguity and verdict use nothing but these protocols, so that another rig (a frame on a shaker, an
+air chamber) is diagnosed by the same code; :mod:`pneumo_ros.gap.rig_model` is the half car's.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Parameter:
     """A nuisance parameter: what the maker states and how well it is known.
 
-    ``std`` is one sigma of the prior in ``unit``; the fit stays inside ``nominal`` +- :data:`~pneumo_ros.gap.fit.REACH` sigma.
+    ``std`` is one sigma of the prior in ``unit``; the fit stays inside ``nominal`` +-
+    :data:`~pneumo_ros.gap.fit.REACH` sigma.
     """
 
     name: str
@@ -110,7 +112,9 @@ class Model(Protocol):
     def effects(self) -> Mapping[str, EffectLike]: ...
 
     def initial(self, record: Any, active: Sequence[Active]) -> tuple[Array, Array]:
-        """Initial state (S,) from the record's first samples, seen through the active sensor effects, and its std (S,)."""
+        """Initial state (S,) from the record's first samples, seen through the active sensor effects, and its std
+        (S,).
+        """
 
     def predict(
         self, record: Any, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
@@ -121,4 +125,4 @@ class Model(Protocol):
         """Places of the rig that an effect at a site touches, first the one it is blamed on."""
 
     def side(self, active: Active) -> str | None:
-        """"front", "rear", "both", or None where sides make no sense."""
+        """ "front", "rear", "both", or None where sides make no sense."""

@@ -1,7 +1,7 @@
 """A fit's data and unknowns: logs averaged to fit samples, weights, and the vector of scaled unknowns.
 
-Unknowns, in this order, each scaled to order one: nuisance parameters in prior sigmas, initial-state corrections of every
-log in prior sigmas, effect values in their typical sizes.
+Unknowns, in this order, each scaled to order one: nuisance parameters in prior sigmas, initial-state corrections of
+every log in prior sigmas, effect values in their typical sizes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.model import Active, Array, EffectParameter, Model
+from pneumo_ros.gap.model import Active, Array, EffectParameter, Mask, Model
 
 AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
 MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
@@ -25,7 +25,6 @@ BLOCK = 1.25  # s, length of a time block
 SELECT_EVERY = 3  # every third block is kept from the fit and used for selection
 
 Part = tuple[str, str]  # effect id, site
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -190,4 +189,7 @@ def average(samples: Array, count: int) -> Array:
 
 def scale_of(record: Any) -> Array:
     """Std of the log's channels, what the gap is normalised by; a constant channel counts as its noise."""
+    own = getattr(record, "scale", None)
+    if own is not None:
+        return np.maximum(own, np.maximum(record.noise, 1e-12))
     return np.maximum(np.std(record.measured, axis=0), np.maximum(record.noise, 1e-12))

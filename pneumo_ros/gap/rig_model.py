@@ -1,4 +1,6 @@
-"""The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled kernel."""
+"""The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
+kernel.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,7 @@ from pneumo_ros.gap.effects.base import (
     ends_of,
 )
 from pneumo_ros.gap.effects.loading import load_library
-from pneumo_ros.gap.model import Active, Array, Parameter
+from pneumo_ros.gap.model import Active, Array, Mask, Parameter
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
 from pneumo_ros.plant.trim import trim
@@ -33,15 +35,15 @@ FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
 COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
 JUMP = 12.0  # medians of the command's change from row to row
 SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
-# The log stamps commands no finer than a sample and says nothing of the bus: a shift of all commands within a sample is no
-# effect.
+# The log stamps commands no finer than a sample and says nothing of the bus: a shift of all commands within a sample
+# is no effect.
 COMMAND_DELAY = "command_delay"
 COMMAND_DELAY_STD = 4e-4  # s
 _NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 # Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. The volume's
-# level and its slope over height are known equally well, and not by the same measurement: both are free (a common factor
-# would leave V/(dV/dh), hence the air's stiffness, exact).
+# level and its slope over height are known equally well, and not by the same measurement: both are free (a common
+# factor would leave V/(dV/dh), hence the air's stiffness, exact).
 NUISANCE = {
     "sprung_mass": "sprung_mass",
     "pitch_inertia": "pitch_inertia",
@@ -241,7 +243,7 @@ class RigModel:
     def _base(self) -> HalfCar:
         return _base(self.rig, self.step)
 
-    def _switches(self, terms: Sequence[Active]) -> tuple[Array, Array]:
+    def _switches(self, terms: Sequence[Active]) -> tuple[Mask, Array]:
         slots = {slot.name: k for k, slot in enumerate(self.slots)}
         on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
         values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in self.slots)])))

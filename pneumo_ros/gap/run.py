@@ -3,31 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.compete import Progress
-from pneumo_ros.gap.diagnose import Options, diagnose
+from pneumo_ros.gap.diagnose import Options, Whereabouts, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
 from pneumo_ros.gap.effects.loading import load_library
+from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
-from pneumo_ros.gap.signals import check_pair, read_signals
-from pneumo_ros.gap.where import place_gaps
+from pneumo_ros.gap.signals import Signals, check_pair, read_signals
+from pneumo_ros.gap.where import Start, locate
 from pneumo_ros.rig import Rig
 
 
-def diagnose_files(
+@dataclass(frozen=True)
+class Task:
+    """Logs that were read and the model that fits them."""
+
+    model: RigModel
+    fit: tuple[Signals, ...]
+    holdout: Signals
+    edit: Signals | None = None
+    notes: tuple[str, ...] = ()
+
+    def diagnose(self, options: Options | None = None, progress: Progress | None = None) -> Diagnosis:
+        """Run the diagnosis, with the places of what is left found by flexible corrections."""
+        chosen = options or Options()
+        if chosen.locate is None:
+            chosen = replace(chosen, locate=whereabouts)
+        found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
+        return replace(found, notes=(*self.notes, *found.notes))
+
+
+def prepared(
     fit: Sequence[str | Path],
     holdout: str | Path | None = None,
     rig: Rig | None = None,
     edit: str | Path | None = None,
     effects: Sequence[str | Path] = (),
     without: Sequence[str] = (),
-    options: Options | None = None,
-    progress: Progress | None = None,
-) -> Diagnosis:
-    """Diagnose logs.
+) -> Task:
+    """Read the logs and build the model.
 
     Parameters
     ----------
@@ -45,18 +63,41 @@ def diagnose_files(
     """
     if not fit:
         raise InputError("no log to fit", remedy="give at least one log")
-    if progress is not None:
-        progress(0.0, "reading the logs")
-    logs = [read_signals(path, rig) for path in fit]
-    held = None if holdout is None else read_signals(holdout, rig)
-    check_pair(logs, held)
     library = load_library(effects)
     for name in without:
         if name not in library:
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
+    logs = [read_signals(path, rig) for path in fit]
+    notes: tuple[str, ...] = ()
+    if holdout is None:
+        check_pair(logs, None)
+        logs, held = split_by_time(logs)
+        notes = ("no held-out log was given: the end of the last fit log is held out, which tests less",)
+    else:
+        held = read_signals(holdout, rig)
+        check_pair(logs, held)
     model = RigModel(logs[0].rig, library, frozenset(without))
-    chosen = options or Options()
-    if chosen.locate is None:
-        chosen = replace(chosen, locate=place_gaps)
     changed = None if edit is None else read_signals(edit)
-    return diagnose(model, logs, held, chosen, progress, changed)
+    return Task(model, tuple(logs), held, changed, notes)
+
+
+def diagnose_files(
+    fit: Sequence[str | Path],
+    holdout: str | Path | None = None,
+    rig: Rig | None = None,
+    edit: str | Path | None = None,
+    effects: Sequence[str | Path] = (),
+    without: Sequence[str] = (),
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose logs; parameters as in :func:`prepared`."""
+    return prepared(fit, holdout, rig, edit, effects, without).diagnose(options, progress)
+
+
+def whereabouts(
+    model: RigModel, fit: Sequence[Signals], holdout: Signals, nuisance: Array, active: Sequence[Active]
+) -> Whereabouts:
+    """Places of what a structure leaves, by flexible corrections of its equations in weak form."""
+    found = locate(model, fit, holdout, Start(nuisance, tuple(active)))
+    return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)

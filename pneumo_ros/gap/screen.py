@@ -2,8 +2,8 @@
 
 A trial prediction with the effect at a start value moves the outputs by some trajectory (not only infinitesimally: a
 deadband or a stop does nothing when small). Projected onto what nuisance parameters and initial state cannot do, and
-compared with the residual, it tells the share of the misfit it could explain. Pairs need no further simulation: the Gram
-matrix of the projected trajectories holds them, so that two effects that only work together are found as well.
+compared with the residual, it tells the share of the misfit it could explain. Pairs need no further simulation: the
+Gram matrix of the projected trajectories holds them, so that two effects that only work together are found as well.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import combinations, product
 import numpy as np
 
 from pneumo_ros.gap.fit import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
-from pneumo_ros.gap.model import Array, EffectParameter
+from pneumo_ros.gap.model import Array, EffectParameter, Mask
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 
 SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
@@ -47,7 +47,9 @@ class Trial:
 
 
 def start_values(parameters: Sequence[EffectParameter]) -> list[tuple[float, ...]]:
-    """Values worth trying: sizes typical, small and at their further starts; one shape parameter at a time elsewhere."""
+    """Values worth trying: sizes typical, small and at their further starts; one shape parameter at a time
+    elsewhere.
+    """
     typical = [p.typical for p in parameters]
     tries = [tuple(typical)]
     tries.append(tuple(p.typical * SMALL if p.size else p.typical for p in parameters))
@@ -110,11 +112,14 @@ def _signed(problem: Problem, trial: Trial) -> bool:
 
 
 def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
-    """The trial's values with its sizes multiplied; kept within a factor of three, where the line may still be believed."""
+    """The trial's values with its sizes multiplied; kept within a factor of three, where the line may still be
+    believed.
+    """
     factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
     parameters = problem.model.effects[trial.part[0]].parameters
     return tuple(
-        float(np.clip(v * factor, p.low, p.high)) if p.size else v for v, p in zip(trial.values, parameters, strict=True)
+        float(np.clip(v * factor, p.low, p.high)) if p.size else v
+        for v, p in zip(trial.values, parameters, strict=True)
     )
 
 
@@ -143,15 +148,17 @@ def _projected(problem: Problem, base: Fit, found: Sequence[Trial]) -> tuple[Arr
 
 
 def _explained(
-    gram: Array, with_residual: Array, members: tuple[int, ...], total: float, signed: Array
+    gram: Array, with_residual: Array, members: tuple[int, ...], total: float, signed: Mask
 ) -> tuple[float, Array]:
-    """Share of the misfit that multiples of the members explain (non-negative where not ``signed``), and the multiples."""
+    """Share of the misfit that multiples of the members explain (non-negative where not ``signed``), and the
+    multiples.
+    """
     index = list(members)
     G, b = gram[np.ix_(index, index)], -with_residual[index]
-    diagonal = np.maximum(np.diag(G), 1e-12)
+    diagonal: Array = np.asarray(np.maximum(np.diag(G), 1e-12))
     if len(index) == 2 and abs(G[0, 1]) > 0.995 * np.sqrt(diagonal[0] * diagonal[1]):
         return 0.0, np.zeros(2)
-    sizes = b / diagonal if len(index) == 1 else np.linalg.solve(G + np.diag(1e-9 * diagonal), b)
+    sizes: Array = np.asarray(np.linalg.solve(G + np.diag(1e-9 * diagonal), b))
     if np.any((sizes <= 0.0) & ~signed):
         return 0.0, sizes
     return float(np.clip(b @ sizes / total, 0.0, 1.0)), sizes

@@ -1,8 +1,8 @@
 """Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
 
 Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than
-structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of the
-library are true to.
+structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of
+the library are true to.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ import numpy as np
 from pneumo_ros.gap.fit import COST_FLOOR, Fit
 from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
+
+TOLL = 4.0  # of the cost, for each parameter
+SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,11 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
 
 
 def _simplest(rivals: Sequence[Scored]) -> Scored:
-    """Fewest parameters among those within one standard error of the best."""
+    """Among those within one standard error of the best: least training cost, each parameter paying :data:`TOLL`.
+
+    The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
+    structures that predict alike, the one that needs no stretched tolerance is right.
+    """
     best = min(rivals, key=lambda s: s.level)
-    close = [s for s in rivals if s.level - best.level <= min(standard_error(s, best), 0.05 * best.level)]
-    return min(close, key=lambda s: (len(s.fit.x), s.level))
+    close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
+    return min(close, key=lambda s: s.fit.cost + TOLL * len(s.fit.x))

@@ -6,7 +6,7 @@ import numpy as np
 
 from pneumo_ros.gap.diagnosis import Estimate
 from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.model import Array
+from pneumo_ros.gap.model import Array, Mask
 from pneumo_ros.gap.problem import Problem
 
 LONGEST = 60  # fit samples over which the residual's correlation is summed
@@ -76,7 +76,7 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
     }
 
 
-def _free(problem: Problem, fit: Fit) -> Array:
+def _free(problem: Problem, fit: Fit) -> Mask:
     low, high = problem.bounds(fit.candidate)
     width = np.where(np.isfinite(high - low), high - low, 1.0)
     return np.asarray((fit.x > low + 1e-6 * width) & (fit.x < high - 1e-6 * width))

@@ -1,7 +1,8 @@
 """From scores to a verdict with a probability.
 
-Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the effect
-is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept from the fit?
+Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the
+effect is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept
+from the fit?
 The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
 """
 
@@ -81,12 +82,14 @@ def _named(
     refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
 ) -> dict[Candidate, float]:
     """Softmax of scores; each further effect pays what chance would give it, and more where laws are only similar."""
+    tolerances = len(refit.fit.x)
     form = limits.model_form**2 * refit.level
 
     def height(s: Scored) -> float:
         level = np.log(calibration.floor * 0.3 + form + s.level)
         toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
-        return float(-calibration.sharpness * (level + toll))
+        stretched = 0.5 * float(np.sum(s.fit.x[:tolerances] ** 2))
+        return float(-calibration.sharpness * (level + toll) - stretched)
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())

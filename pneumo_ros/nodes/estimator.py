@@ -59,7 +59,7 @@ class EstimatorNode(RigNode):
         if stamp != self._stamps[1] or stamp != self._stamps[2]:
             return
         start = time.monotonic_ns()
-        if self.state is None or stamp < self._last_stamp:  # a replayed log jumped back: begin again
+        if self.state is None or not self.continues(stamp, self._last_stamp):
             self.state = self.estimator.init(self._sample)
         self._last_stamp = stamp
         self.state, estimate = self.estimator.step(self.state, self._sample)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.comfort_limits import ISO_1972_HOURS, iso_1972_limit, third_octaves
+from pneumo_ros.comfort_limits import HEALEY, ISO_1972_HOURS, iso_1972_limit, third_octaves
 from pneumo_ros.road import LENGTH_SCALE
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import CONVENTIONAL, HalfExperiment, heave_of, measure
-from pneumo_ros.thesis.report import Chapter, Picture, Step, canvas, verdict
+from pneumo_ros.thesis.report import Chapter, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 
 STEPS = 2
@@ -52,7 +52,23 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
         "under active control with the rig's sensors, 4 in3 of believed volume and 0.2 in of height error."
     )
     return Chapter(
-        2, "Ride comfort and baselines", lead, claims, [table("Rides by every criterion", o)], [_spectra(settings)]
+        2,
+        "Ride comfort and baselines",
+        lead,
+        claims,
+        [table("Rides by every criterion", o), _healey_table()],
+        [_spectra(settings)],
+    )
+
+
+def _healey_table() -> Table:
+    low = 0.0
+    rows = []
+    for bound, road, rating in HEALEY:
+        rows.append([road, f"{low:g} to {bound:g}" if np.isfinite(bound) else f"above {low:g}", rating])
+        low = bound
+    return Table(
+        "Table 2.1: Healey's ratings", ["road", "vertical, rms g", "rating range"], rows, "as the code uses it"
     )
 
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from pneumo_ros.paths import share_file
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
-from pneumo_ros.plant.similitude import HONDA_CIVIC, Powers, representative_pi_numbers
+from pneumo_ros.plant.similitude import BASE, DIMENSIONS, HONDA_CIVIC, Powers, pi_number, representative_pi_numbers
 from pneumo_ros.thesis.chapter5 import read_table
 from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
@@ -29,8 +29,8 @@ PRINTED: dict[str, tuple[int, int, int]] = {
 def build(settings: ThesisSettings, step: Step) -> Chapter:
     """The chapter's tables and claims."""
     step("similitude of the conventional half car")
-    tables = [_pi_table(), _civic_table()]
-    claims = [_pi_claim(), _law_claim(), _similar_claim(), _civic_claim(), _stiffness_claim()]
+    tables = [_dimension_table(), _pi_table(), _variable_table(), _civic_table()]
+    claims = [_pi_claim(), _law_claim(), _similar_claim(), _civic_claim(), _index_claim(), _stiffness_claim()]
     lead = (
         "Pi-numbers come from the dimensional table by linear algebra; scale factors are length 5, mass 12, time 1 "
         "(Eqs. 3.51-3.54). Gravity drops out of the conventional half car, because its motion is counted from rest."
@@ -53,6 +53,34 @@ def read_car(name: str) -> dict[str, tuple[float, str]]:
     """A car's table as {name: (value in SI, quantity)}."""
     with share_file("config", "tables", name).open(newline="", encoding="utf-8") as handle:
         return {row["name"]: (float(row["value"]), row["quantity"]) for row in csv.DictReader(handle)}
+
+
+def _dimension_table() -> Table:
+    shown = ("length", "mass", "frequency", "stiffness", "damping", "inertia", "force", "pressure", "gas_constant")
+    rows = [[name, *[str(power) for power in DIMENSIONS[name]]] for name in shown]
+    return Table(
+        "Table 3.1: dimensional table",
+        ["quantity", *BASE],
+        rows,
+        "one row a kind of quantity; powers of the base units",
+    )
+
+
+def _variable_table() -> Table:
+    units = {
+        "displacement": "length",
+        "velocity": "velocity",
+        "acceleration": "acceleration",
+        "angular velocity": "frequency",
+    }
+    rows = []
+    for name, kind in units.items():
+        divisor = pi_number(kind)
+        divisor.pop(kind, None)
+        rows.append([name, f"{name} / ({in_words({n: -p for n, p in divisor.items()}) or kind})"])
+    return Table(
+        "Table 3.2: dimensionless variables", ["variable", "made dimensionless"], rows, "same primary quantities"
+    )
 
 
 def _pi_table() -> Table:
@@ -129,6 +157,23 @@ def _civic_claim() -> Claim:
     )
 
 
+def dynamic_index(inertia: float, mass: float, front_arm: float, rear_arm: float) -> float:
+    """r^2/(a b) of Eq. 2.2: 1 uncouples front and rear."""
+    return inertia / (mass * front_arm * rear_arm)
+
+
+def _index_claim() -> Claim:
+    rig = read_car("table_3_4_half_car.csv")
+    mass, a, b = rig["sprung_mass"][0], rig["front_arm"][0], rig["rear_arm"][0]
+    ours, printed = dynamic_index(rig["pitch_inertia"][0], mass, a, b), dynamic_index(7513e-6, mass, a, b)
+    return verdict(
+        "dynamic-index",
+        f"{ours:.3f}",
+        0.9 <= ours <= 1.0,
+        f"with Table 3.4's inertia as 25.65 lbf in s2; as printed (lb in2) it would be {printed:.4f} (errata 1)",
+    )
+
+
 def _stiffness_claim() -> Claim:
     """Stiffness at 10 psig and 1.7 in from Tables 4.1 and 5.2: gas and area share (n = 1.4)."""
     heights, names, areas = read_table("table_5_2_effective_area_in2.csv")
@@ -143,4 +188,5 @@ def _stiffness_claim() -> Claim:
         "spring-stiffness",
         f"{gas + shape:.0f} lb/in ({gas:.0f} of the gas, {shape:.0f} of the area)",
         abs((gas + shape) / 80.0 - 1.0) < 0.15,
+        "the gas alone is softer, the area of Table 5.2 adds as much again; how 80 was calculated is not said",
     )

@@ -22,6 +22,7 @@ LOADS_LB = (4.0, 6.0, 8.0, 10.0)
 UNPRESSURISED_LB = 8.0  # F_0 of Eq. 5.5: what the bellows carries at 0 psig
 STEPS = 3
 EXPERIMENTS = 3
+SCATTER = "the exception is 4 lb from 15 to 20 psig: near 2.05 in the scatter of Table 5.2 decides the slope"
 PRINT_TOLERANCE = 0.05  # share by which a recomputed area may differ from the printed one before it is listed
 
 
@@ -231,7 +232,10 @@ def _dynamic(settings: ThesisSettings) -> tuple[list[Table], list[Claim], list[P
     claims = [
         verdict("table-5.4", f"{100 * error:.1f} % rms over 20 pairs", error < 0.06, "no tuned number"),
         verdict(
-            "frequency-pressure", _share(np.diff(ours, axis=0) > 0.0, "rise"), bool((np.diff(ours, axis=0) > 0.0).all())
+            "frequency-pressure",
+            _share(np.diff(ours, axis=0) > 0.0, "rise"),
+            bool((np.diff(ours, axis=0) > 0.0).all()),
+            SCATTER,
         ),
         verdict(
             "frequency-load", _share(np.diff(ours, axis=1) < 0.0, "fall"), bool((np.diff(ours, axis=1) < 0.0).all())
@@ -246,7 +250,7 @@ def _dynamic(settings: ThesisSettings) -> tuple[list[Table], list[Claim], list[P
             "damping-falls",
             _share(np.diff(ratios, axis=0) < 0.0, "fall"),
             bool((np.diff(ratios, axis=0) < 0.0).all()),
-            "the conclusion (7.1) says rises: errata 13",
+            SCATTER + "; the conclusion (7.1) says rises: errata 13",
         ),
         verdict(
             "damping-range",

@@ -89,6 +89,7 @@ def claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:
             "half-valve",
             f"fully open {100 * thesis.saturated:.1f} % of the time (default gains: {100 * tuned.saturated:.2f} %)",
             thesis.saturated < 0.001,
+            "the wanted pressure rate is F'/A, and the area vanishes at 2.2 in; the default gains put a floor under it",
         ),
         verdict(
             "half-estimator",

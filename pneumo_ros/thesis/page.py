@@ -18,7 +18,8 @@ from pneumo_ros.thesis.settings import ThesisSettings
 TEMPLATE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>The thesis, recomputed</title><style>
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 76rem; margin: 2rem auto; padding: 0 1rem; color: #1a1a1a }
-table { border-collapse: collapse; margin: .6rem 0 1.4rem; font-size: 13px } caption { text-align: left; font-weight: 600 }
+table { border-collapse: collapse; margin: .6rem 0 1.4rem; font-size: 13px }
+caption { text-align: left; font-weight: 600 }
 th, td { border: 1px solid #ccc; padding: .25rem .5rem; text-align: left; vertical-align: top }
 th { background: #f3f3f3 } .yes { background: #e7f5e9 } .no { background: #fdecea } img { max-width: 100% }
 figure { margin: 1rem 0 } figcaption, .note { color: #555; font-size: 13px } code { font-size: 12px }
@@ -43,7 +44,8 @@ figure { margin: 1rem 0 } figcaption, .note { color: #555; font-size: 13px } cod
 {% endfor %}
 {% if equations %}<h2 id="equations">Equations and where they are used</h2><table><tr><th>Eq.</th><th>in</th></tr>
 {% for n, names in equations.items() %}<tr><td>{{ n[0] }}.{{ n[1] }}</td>
-<td>{% for name in names %}<code>{{ name }}</code>{{ ", " if not loop.last }}{% endfor %}</td></tr>{% endfor %}</table>{% endif %}
+<td>{% for name in names %}<code>{{ name }}</code>{{ ", " if not loop.last }}{% endfor %}</td></tr>
+{% endfor %}</table>{% endif %}
 </body></html>
 """
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,7 @@ Logs = NDArray[np.float64]
 LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
 GRADE_TOLERANCE = 0.04  # relative
-LARGEST_TRIES = 12
+QUICK_TRIES, CAREFUL_TRIES = 5, 9
 RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
 
 
@@ -184,37 +185,37 @@ def _graded(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, o
 
 
 def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> float:
-    """Size whose refit gap is ``case.grade`` floors: false position on log(excess) over log(size).
+    """Size whose refit gap is ``case.grade`` floors: the quick ruler finds the neighbourhood, the refit decides."""
 
-    The quick ruler finds the neighbourhood, the full refit decides.
-    """
-    wanted = 0.5 * math.log(case.grade**2 - 1.0)
-    low: tuple[float, float] | None = None
-    high: tuple[float, float] | None = None
-    size, careful = min(0.02 * case.grade, 0.5), False
-    best, closest = size, math.inf
-    for _ in range(LARGEST_TRIES):
+    def ratio_at(size: float, careful: bool) -> float:
         rig, road_gain = _combined(twin, _applied(case, twin, (size,), seed))
         session = play(rig, on.nominal, scene, on.car.surface, road_gain)
-        ratio = _left(session, null, on, careful) / null.gap
-        off = abs(ratio / case.grade - 1.0)
-        if not careful and (off < 2.0 * GRADE_TOLERANCE or (size >= 1.0 and ratio < case.grade)):
-            careful, low, high = True, None, None
-            ratio = _left(session, null, on, careful) / null.gap
-            off = abs(ratio / case.grade - 1.0)
-        if careful and off < closest:
+        return _left(session, null, on, careful) / null.gap
+
+    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)[0]
+
+
+def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
+    """(size, how far off its ratio is): false position on log(excess over the floor) against log(size)."""
+    wanted = 0.5 * math.log(grade**2 - 1.0)
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    size, best, closest = start, start, math.inf
+    for _ in range(tries):
+        ratio = ratio_at(size)
+        off = abs(ratio / grade - 1.0)
+        if off < closest:
             best, closest = size, off
-        if closest < GRADE_TOLERANCE:
-            return best
-        excess = 0.5 * math.log(max(ratio**2 - 1.0, 1e-3)) if math.isfinite(ratio) else 10.0
+        if off < GRADE_TOLERANCE or (size >= 1.0 and ratio < grade):
+            break
+        excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
         if excess < wanted:
             low = (math.log(size), excess)
-            if size >= 1.0:
-                return 1.0
         else:
             high = (math.log(size), excess)
         size = _next_size(low, high, wanted)
-    return best if math.isfinite(closest) else size
+    return best, closest
 
 
 def _left(session: Session, null: Null, on: Bench, careful: bool) -> float:

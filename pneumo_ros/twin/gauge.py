@@ -138,25 +138,19 @@ def refit(
 
 
 def quick_gap(car: HalfCar, seen: Observation, null: Null) -> float:
-    """About what :func:`refit` would leave, from the sensitivities of the same log without its effect.
+    """About what :func:`refit` would leave: the linear refit with the sensitivities of the log without its effect.
 
-    Three steps with a fixed Jacobian cost four simulations instead of some sixty; good enough to search a size.
+    One simulation instead of some sixty, and smooth in the size of an effect: good enough to search from.
     """
     sigma = np.array([s for _, _, s in NUISANCE])
     scale = np.std(seen.measured, axis=0)
-    jacobian = null.jacobian / np.tile(scale, len(seen.measured[::DECIMATE]))[:, None]
-    prior, at, best = float(np.mean(seen.noise / scale)), null.logs / sigma, np.inf
-    for _ in range(4):
-        model = free_run(perturbed(car, at * sigma), seen)
-        if not np.isfinite(model).all():
-            break
-        value = gap(model, seen)
-        if value > 0.98 * best:
-            return min(best, value)
-        best = value
-        error = ((seen.measured - model)[::DECIMATE] / scale).ravel()
-        at = np.clip(at + _damped_step(jacobian, error, at, prior, 1e-6), -3.0, 3.0)
-    return best
+    model = free_run(perturbed(car, null.logs), seen)
+    if not np.isfinite(model).all():
+        return np.inf
+    jacobian = null.jacobian / np.tile(scale, len(model[::DECIMATE]))[:, None]
+    error = ((seen.measured - model)[::DECIMATE] / scale).ravel()
+    step = _damped_step(jacobian, error, null.logs / sigma, float(np.mean(seen.noise / scale)), 0.0)
+    return float(np.sqrt(np.mean((error - jacobian @ step) ** 2)))
 
 
 def null_of(car: HalfCar, seen: Observation) -> Null:

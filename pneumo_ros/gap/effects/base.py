@@ -1,7 +1,7 @@
 """What an effect is: identity, sites, parameters, and one or more hooks by which it acts.
 
-A file of this folder defines one module-level ``EFFECT``; a user's own file does the same and is loaded by path or by the
-entry point group ``pneumo_ros.effects``. Four kinds of hook:
+A file of this folder defines one module-level ``EFFECT``; a user's own file does the same and is loaded by path or by
+the entry point group ``pneumo_ros.effects``. Four kinds of hook:
 
 - ``plant``: changes parameters of the nominal model (costs nothing),
 - ``inputs``: changes command or road on their way to the plant (outside the kernel),
@@ -48,7 +48,9 @@ class Plant(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What drives the plant: commands (N, 4) m2, each row held over a period; road (N + 1, 2) m, linear between rows."""
+    """What drives the plant: commands (N, 4) m2, each row held over a period; road (N + 1, 2) m, linear between
+    rows.
+    """
 
     commands: Array
     road: Array

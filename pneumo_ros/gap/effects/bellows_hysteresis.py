@@ -1,7 +1,8 @@
 """Hysteresis of the bellows' rubber and cord: a Bouc-Wen element in parallel with the spring.
 
-Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976, with exponent one and equal
-loading and unloading constants. It differs from dry friction by its length: millimetres of travel, not a bristle's tenth.
+Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976, with exponent one and
+equal loading and unloading constants. It differs from dry friction by its length: millimetres of travel, not a
+bristle's tenth.
 """
 
 from __future__ import annotations

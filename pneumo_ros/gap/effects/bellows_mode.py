@@ -1,7 +1,7 @@
 """A mode of the bellows itself: part of its mass moves against the height and answers near its own frequency.
 
-q'' = w^2 (h - q) + 2 zeta w (h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (h' - q')): far below w the bellows
-follow the height and no force is left but m h''.
+q'' = w^2 (h - q) + 2 zeta w (h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (h' - q')): far below w the
+bellows follow the height and no force is left but m h''.
 """
 
 from __future__ import annotations

@@ -9,9 +9,7 @@ from pneumo_ros.gap.model import EffectParameter
 def plant(plant: Plant, ends: Ends, values: Values) -> Plant:
     """Shortens the front arm by what the rear arm gains; the axles stay."""
     body = plant.body
-    return plant._replace(
-        body=body._replace(front_arm=body.front_arm - values[0], rear_arm=body.rear_arm + values[0])
-    )
+    return plant._replace(body=body._replace(front_arm=body.front_arm - values[0], rear_arm=body.rear_arm + values[0]))
 
 
 EFFECT = Effect(

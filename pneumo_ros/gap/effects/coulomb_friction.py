@@ -1,7 +1,8 @@
 """Dry friction of the strut's bushing: LuGre with the steady curve Fc + (Fs - Fc) exp(-(v/vs)^2).
 
 Source: Canudas de Wit, Olsson, Astrom, Lischinsky, "A new model for control of systems with friction", IEEE TAC 40(3),
-1995. The bristle state is advanced by its exact solution at held speed, so that the stiffest bristle needs no shorter step.
+1995. The bristle state is advanced by its exact solution at held speed, so that the stiffest bristle needs no shorter
+step.
 """
 
 from __future__ import annotations

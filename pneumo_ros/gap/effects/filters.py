@@ -41,7 +41,12 @@ def lagged_hold(u: Array, period: float, lag: float, damping: float) -> Array:
     step = expm(block * period)
     zero = np.zeros(2)
     return _run(
-        np.ascontiguousarray(u), step[:2, :2].copy(), step[:2, 2].copy(), zero, step[3, :2] / period, step[3, 2] / period
+        np.ascontiguousarray(u),
+        step[:2, :2].copy(),
+        step[:2, 2].copy(),
+        zero,
+        step[3, :2] / period,
+        step[3, 2] / period,
     )
 
 

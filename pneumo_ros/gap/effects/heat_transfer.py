@@ -1,7 +1,7 @@
 """Heat between the spring's air and its wall: energy balance instead of a bare polytropic exponent.
 
-dP/dt gains (n - 1)/V hA (T_wall - T), where T follows from the air's mass (a state) by P V = m R T; the wall stays at the
-supply's temperature. Source: energy balance of a control volume; hA 0 leaves the nominal law.
+dP/dt gains (n - 1)/V hA (T_wall - T), where T follows from the air's mass (a state) by P V = m R T; the wall stays at
+the supply's temperature. Source: energy balance of a control volume; hA 0 leaves the nominal law.
 """
 
 from __future__ import annotations

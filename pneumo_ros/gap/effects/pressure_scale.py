@@ -1,4 +1,6 @@
-"""A pressure sensor whose sensitivity is off; it may pivot about vacuum (absolute cell) or the atmosphere (gauge cell)."""
+"""A pressure sensor whose sensitivity is off; it may pivot about vacuum (absolute cell) or the atmosphere (gauge
+cell).
+"""
 
 from __future__ import annotations
 

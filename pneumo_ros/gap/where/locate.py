@@ -23,8 +23,10 @@ from pneumo_ros.gap.where.weak import EQUATIONS
 
 Array = NDArray[np.float64]
 
-# In null standard deviations (rms). Rigs with nothing but tolerances stay below 1.25 whatever laws they are made with.
+# In null standard deviations (rms). Rigs with nothing but tolerances stay below 1.25 whatever laws they are made with,
+# and no single place closes more than a fifth of that.
 FLAT = 1.5
+SINGLED_OUT = 0.3
 LARGEST = 5  # places in a set: two effects at both ends, and one more to see that it is not needed
 # A further place must take this share of what is left (mean square) to be believed.
 WORTH = 0.4
@@ -101,7 +103,7 @@ class Location:
     @property
     def flat(self) -> bool:
         """Whether noise, tolerances and model form explain every equation."""
-        return self.level["refit"] < FLAT
+        return not self.chosen
 
     @property
     def flexible_improves(self) -> float:
@@ -208,7 +210,9 @@ def _smallest(forms: Forms, places: Sequence[str]) -> list[str]:
     for size in range(1, min(LARGEST, len(places)) + 1):
         sets.append(best_subset(forms, size, sets[-1], places))
         levels.append(forms.value(sets[-1]))
-    for size, level in enumerate(levels):
+    if levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]:
+        return []
+    for size, level in enumerate(levels[1:], start=1):
         ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]
         if level < FLAT**2 or all(ahead):
             return sets[size]

@@ -1,0 +1,156 @@
+"""Fit, screening, competition and verdict on the model's own data, where the truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rig_logs import excitation, signals_of, simulated
+
+from pneumo_ros.gap.compete import Effort
+from pneumo_ros.gap.diagnose import Options, diagnose
+from pneumo_ros.gap.events import timed
+from pneumo_ros.gap.fit import bounded_newton, fit, sensitivities
+from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
+from pneumo_ros.gap.model import Active
+from pneumo_ros.gap.problem import Candidate, Problem
+from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.gap.screen import all_parts, promises, trials
+from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
+from pneumo_ros.plant.trim import trim
+from pneumo_ros.rig import load_rig
+
+QUICK = Effort(singles=5, finalists=3, leaders=1, seconds=2, blind_pairs=1, pair_finalists=2)
+
+
+@pytest.fixture(scope="module")
+def model() -> RigModel:
+    return RigModel(load_rig())
+
+
+def drawn(model: RigModel, seed: int, spread: float = 1.0) -> np.ndarray:
+    """Nuisance values inside the tolerances."""
+    rng = np.random.default_rng(seed)
+    sigmas = np.clip(rng.normal(size=len(model.parameters)), -2.0, 2.0) * spread
+    return np.array([p.nominal + p.std * s for p, s in zip(model.parameters, sigmas, strict=True)])
+
+
+def log(model: RigModel, seed: int, nuisance: np.ndarray | None = None, active: tuple[Active, ...] = ()) -> Signals:
+    """A log of the model itself, from rest at the nominal trim, with sensor noise."""
+    road, commands = excitation(6.0, seed)
+    inputs = driven(road, commands)
+    clean = model.simulate(inputs, nuisance, trim(model.rig).state, active)
+    return signals_of(clean, road, commands, seed, f"log-{seed}")
+
+
+def driven(road: np.ndarray, commands: np.ndarray) -> Signals:
+    """Inputs alone, the sensors still at rest."""
+    return signals_of(np.tile(simulated(0.1, 1)[0][0], (len(road), 1)), road, commands)
+
+
+def test_refit_gives_back_what_the_log_was_made_with(model: RigModel) -> None:
+    truth = drawn(model, 3)
+    record, held = log(model, 1, truth), log(model, 2, truth)
+    problem = Problem(model, (record,))
+    start = problem.start(Candidate(), None, ())
+    found = fit(problem, Candidate(), start, iterations=12)
+    nominal = np.array([p.nominal for p in model.parameters])
+    before, after = (total_gap(channel_gaps(held, free_run(model, held, n, ())))
+                     for n in (nominal, problem.nuisance(found.x)))  # fmt: skip
+    assert after < 0.01 < 0.1 < before
+    found = sensitivities(problem, found)
+    estimates = nuisance_estimates(problem, found, covariance(problem, found))
+    off = [(estimates[p.name].value - t) / max(estimates[p.name].std, 1e-3 * p.std)
+           for p, t in zip(model.parameters, truth, strict=True)]  # fmt: skip
+    assert np.sqrt(np.mean(np.square(off))) < 2.5
+
+
+def test_bounded_newton_stays_inside_and_is_optimal() -> None:
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(30, 6))
+    H, g = A.T @ A, rng.normal(size=6) * 30.0
+    low, high = np.full(6, -0.3), np.full(6, 0.3)
+    move = bounded_newton(H, g, low, high)
+    gradient = H @ move + g
+    inside = (move > low + 1e-9) & (move < high - 1e-9)
+    assert np.all(move >= low) and np.all(move <= high) and (~inside).any()
+    assert np.max(np.abs(gradient[inside]), initial=0.0) < 1e-8
+    assert np.all(gradient[move >= high - 1e-9] < 1e-8) and np.all(gradient[move <= low + 1e-9] > -1e-8)
+
+
+def test_screening_ranks_the_true_effect_first(model: RigModel) -> None:
+    record = log(model, 1, drawn(model, 4, 0.5), (Active("valve_lag", "rear", (0.02, 0.8)),))
+    problem = Problem(model, (record,))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
+    ranked = promises(problem, refit, trials(problem, refit, all_parts(problem)))
+    assert (("valve_lag", "rear"),) in [p.parts for p in ranked[:2]] and ranked[0].share > 0.8
+
+
+def test_a_candidate_that_runs_away_loses_and_does_not_raise(model: RigModel) -> None:
+    problem = Problem(model, (log(model, 1),))
+    wild = Candidate((("effective_area_error", "both"),))
+    start = problem.start(wild, None, (-0.4, -1.5))
+    assert np.isinf(fit(problem, wild, start, iterations=1).cost) or fit(problem, wild, start, iterations=1).cost > 0
+
+
+def test_jumps_between_samples_are_timed(model: RigModel) -> None:
+    """Commands that really jumped half a sample before the row that shows them."""
+    road, commands = excitation(6.0, 1)
+    steps = np.repeat(np.random.default_rng(5).uniform(0.75, 1.25, (12, 2)), 250, axis=0)
+    commands[:, :2] = trim(model.rig).command[:2] * steps
+    inputs = driven(road, commands)
+    events = model.events(inputs)
+    assert len(events) == 22
+    lead = np.random.default_rng(6).choice([0.0, 0.5], len(events))
+    truth = model.led(inputs, events, lead)
+    clean = model.simulate(truth, initial=trim(model.rig).state)
+    problem = Problem(model, (signals_of(clean, road, commands, 1),))
+    best = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
+    moved = timed(problem, best)
+    assert moved is not problem
+    again = fit(moved, Candidate(), best.x, best.jacobian)
+    assert np.mean(again.residual**2) < 0.5 * np.mean(best.residual**2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("truth", "verdict", "side", "place"),
+    [
+        ((), "none", None, None),
+        ((Active("leak", "front", (3e-7,)),), "leak", "front", "front_air"),
+        ((Active("lvdt_scale", "sprung_rear", (0.03,)),), "lvdt_scale", None, "sensor:sprung_rear"),
+    ],
+)
+def test_verdict_side_and_place(
+    model: RigModel, truth: tuple[Active, ...], verdict: str, side: str | None, place: str | None
+) -> None:
+    nuisance = drawn(model, 8)
+    found = diagnose(model, [log(model, 1, nuisance, truth)], log(model, 2, nuisance, truth), Options(effort=QUICK))
+    assert found.verdict == verdict
+    assert found.location == () if place is None else found.location[0][0] == place
+    assert found.probability > 0.3
+    if truth:
+        best = next(r for r in found.ranking if r.effects == (truth[0].effect,))
+        assert best.side == side and best.shrink > 0.8
+        assert best.shrink_ci90[0] <= best.shrink <= best.shrink_ci90[1]
+        assert found.gap.best < found.gap.refit < found.gap.nominal
+        (estimate,) = best.parameters.values()
+        assert abs(estimate.value - truth[0].values[0]) < 3.0 * estimate.std + 0.02 * abs(estimate.value)
+
+
+def test_what_is_withheld_does_not_compete(model: RigModel) -> None:
+    without = replace(model, withheld=frozenset({"leak"}))
+    assert "leak" not in without.effects and "leak" in without.library
+    problem = Problem(without, (log(model, 1),))
+    assert all(effect != "leak" for effect, _ in all_parts(problem))
+
+
+def test_bootstrap_interval_holds_the_shrink(model: RigModel) -> None:
+    record = log(model, 1)
+    rng = np.random.default_rng(2)
+    error = rng.normal(size=record.measured.shape) * record.scale
+    refit, best = record.measured + error, record.measured + 0.25 * error
+    low, high = bootstrap_shrink(record, refit, best)
+    assert low <= 0.75 <= high and high - low < 0.05
