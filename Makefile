@@ -7,10 +7,10 @@ READY := $(VENV)/.ready
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint types unit bench docs blind lock clean help
+.PHONY: demo test lint types unit bench docs blind blind-ci lock clean help
 
 help:  ## Show this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
 
 $(READY): requirements.lock setup.py package.xml
 	$(PYTHON) -m venv $(VENV)
@@ -36,11 +36,24 @@ unit: $(READY)
 bench: $(READY)  ## Every benchmark, side by side with its limit
 	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
+WORKERS ?= 2
+BLIND ?= build/blind
+
+blind: $(READY)  ## The full blind check, 240 sealed cases (hours); goes on where it was interrupted
+	$(BIN)/pneumo blind make $(BLIND) --set full --workers $(WORKERS)
+	$(BIN)/pneumo blind diagnose $(BLIND) --workers $(WORKERS)
+	$(BIN)/pneumo blind score $(BLIND) --output docs/blind-results.md
+
+blind-ci: $(READY)  ## Six blind cases that must keep their verdicts
+	$(BIN)/pneumo blind make $(BLIND)-ci --set ci --workers $(WORKERS)
+	$(BIN)/pneumo blind diagnose $(BLIND)-ci --workers $(WORKERS)
+	$(BIN)/pneumo blind score $(BLIND)-ci --expect test/data/blind-ci.json
+
 docs: $(READY)  ## Write the generated tables of docs/ anew
 	$(BIN)/python -m pneumo_ros.cli.reference
 
 lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
-	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra dev \
+	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra view --extra dev \
 		--no-emit-index-url --no-annotate --no-header --output-file requirements.lock
 
 clean:  ## Remove the virtual environment and what was built

@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 NAME = "pneumo_ros"
 
 # Every node is an executable of its own: `ros2 run pneumo_ros <name>`, and a console script under pip.
-NODES = ["road_profile", "plant", "estimator", "controller", "session_recorder"]
+NODES = ["road_profile", "plant", "daq", "estimator", "controller", "session_recorder"]
 
 # One list of wheels for those who have no ROS 2 installed; a sourced ROS keeps its own.
 ROS_WHEELS = [
@@ -35,7 +35,7 @@ setup(
     maintainer="pneumo_ros maintainers",
     maintainer_email="maintainers@pneumo-ros.example",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.gap.report": ["*.j2"]},
+    package_data={f"{NAME}.gap.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"]},
     python_requires=">=3.10,<3.14",
     install_requires=[
         "setuptools",
@@ -62,6 +62,7 @@ setup(
         "dev": [
             "pytest>=8",
             "pytest-timeout>=2.3",
+            "pytest-rerunfailures>=14",
             "hypothesis>=6.100",
             "ruff>=0.6",
             "mypy>=1.11",

@@ -152,7 +152,7 @@ def make_road(spec: RoadSpec, where: object = "road") -> Road:
 
 
 def iso_psd(frequency_hz: ArrayLike, iso_class: str, speed: float) -> NDArray[np.float64]:
-    """One-sided temporal PSD of the full-scale road, m2/Hz (Eqs. 6.1 and 6.3).
+    """One-sided temporal PSD of the full-scale road, m2/Hz (Eqs. 6.1-6.3; over 2 pi it is Eq. 6.4, per rad/s).
 
     Parameters
     ----------

@@ -167,9 +167,9 @@ class Truth:
 
     def wrong_values(self, measurements: Sequence[Measurement]) -> int:
         """Measurements whose counts are not those the board converted, in any of its boots."""
-        wrong = 0
+        wrong, boots = 0, sorted(set(self.boot.tolist()))
         for m in measurements:
-            rows = [self._rows.get((boot, m.sequence)) for boot in set(self.boot.tolist())]
+            rows = [self._rows.get((boot, m.sequence)) for boot in boots]
             wrong += not any(row is not None and tuple(self.counts[row]) == m.counts for row in rows)
         return wrong
 

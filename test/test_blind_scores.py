@@ -130,12 +130,17 @@ def test_page_holds_scores_baselines_and_failures(tmp_path: Path) -> None:
     text = page.read_text()
     for word in ("top-1", "always none", "best training fit", "| e | none | none |", "Every failure (4)"):
         assert word in text
-    assert page.with_suffix(".png").stat().st_size > 5000
+    assert next(tmp_path.glob("results-t-*.png")).stat().st_size > 5000
+    write_report(page, LABELS, FOUND, {"set": "later", "seed": 2, "software": "s"})
+    both = page.read_text()
+    assert both.index("Set `later`") < both.index("Set `t`")
+    assert both.count("# The blind check") == 1
 
 
 def test_results_are_read_as_the_contract_says(tmp_path: Path) -> None:
     diagnosis = {
         "verdict": "leak+payload", "probability": 0.8, "ambiguity_group": [], "gap": {},
+        "edit_test": {"log": "e", "gap_nominal": 0.5, "gap_refit": 0.2, "gap_best": 0.1},
         "location": [{"place": "supply", "share": 0.2}, {"place": "front_air", "share": 0.7}],
         "ranking": [{"effects": ["payload", "leak"], "side": "front", "probability": 0.8, "parameters": {}}],
     }  # fmt: skip
@@ -144,6 +149,7 @@ def test_results_are_read_as_the_contract_says(tmp_path: Path) -> None:
     assert item.named == {"leak", "payload"}
     assert item.places == ("front_air", "supply")
     assert item.best["side"] == "front"
+    assert (item.edit["nominal"], item.edit["best"]) == (0.5, 0.1)
     assert parse({"verdict": "none", "probability": 1.0}).declared == {"none"}
     (tmp_path / "x.json").write_text("{")
     with pytest.raises(InputError, match="cannot read this diagnosis"):

@@ -154,13 +154,10 @@ def test_zero_and_span() -> None:
 
 
 def test_command_line_writes_a_file_that_loads_and_flags_the_default(tmp_path: Path) -> None:
-    import typer
     from typer.testing import CliRunner
 
-    from pneumo_ros.cli.calibrate import calibrate
+    from pneumo_ros.cli.calibrate import app
 
-    app = typer.Typer()
-    app.command()(calibrate)
     csv = points_file(tmp_path, rows_of(-1.2, 9.9, np.linspace(0.5, 2.0, 8), 10, 1e-4, 3))
     output, plot = tmp_path / "mine.yaml", tmp_path / "mine.png"
     run = CliRunner().invoke(app, [str(csv), "--output", str(output), "--plot", str(plot)])

@@ -148,6 +148,7 @@ def test_nodes_end_when_their_supervisor_is_killed(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.realtime
 def test_real_time_session_keeps_the_clock_and_takes_live_gains(tmp_path: Path) -> None:
     """Gains change while it runs and the change is logged; a bad one is refused; missed periods are counted."""
     path = tmp_path / "session.mcap"

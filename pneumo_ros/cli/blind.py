@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +14,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
 
-app = typer.Typer(no_args_is_help=True, help="Check the diagnosis on cases whose answer is withheld.")
+app = typer.Typer(
+    no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
+)
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the set: manifest.json, cases/, labels.json.")]
 Workers = Annotated[int, typer.Option(help="Local processes.", min=1)]
@@ -40,7 +42,7 @@ def make(
     cases = [case for case in plan(set_name) if only in case.name]
     items = [(case, str(folder)) for case in cases]
     _run("making", make_case, items, [case.name for case in cases], workers, scheduler)
-    _seal(folder, set_name, [case.name for case in cases])
+    seal_set(folder, set_name, [case.name for case in cases])
 
 
 @app.command()
@@ -111,23 +113,21 @@ def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int,
                          remedy="run the same command again: finished cases are kept")  # fmt: skip
 
 
-def _seal(folder: Path, set_name: str, names: Iterable[str]) -> None:
-    """Write manifest.json and labels.json; a set that is sealed already keeps its seals."""
+def seal_set(folder: Path, set_name: str, names: Sequence[str]) -> None:
+    """Write manifest.json and labels.json; what is sealed already keeps its seal, new cases are added."""
     from pneumo_ros.twin.plan import plan, seed_of
     from pneumo_ros.twin.seal import sealed
 
-    if (folder / "manifest.json").exists() and (folder / "labels.json").exists():
-        return
-    labels = [json.loads((folder / "labels" / f"{name}.json").read_text(encoding="utf-8")) for name in names]
+    before = read_manifest(folder)["cases"] if (folder / "manifest.json").exists() else []
+    entries = json.loads((folder / "labels.json").read_text(encoding="utf-8")) if before else []
+    new = [name for name in names if name not in {entry["name"] for entry in before}]
+    labels = [json.loads((folder / "labels" / f"{name}.json").read_text(encoding="utf-8")) for name in new]
     salted, digests = sealed(labels)
     withheld = {case.name: list(case.withhold) for case in plan(set_name)}
-    manifest = {
-        "set": set_name,
-        "seed": seed_of(set_name),
-        "software": f"pneumo_ros {__version__}",
-        "cases": [{"name": n, "withhold": withheld[n], "label_sha256": digests[n]} for n in names],
-    }
-    for name, content in (("labels.json", salted), ("manifest.json", manifest)):
+    added = [{"name": name, "withhold": withheld[name], "label_sha256": digests[name]} for name in new]
+    manifest = {"set": set_name, "seed": seed_of(set_name), "software": f"pneumo_ros {__version__}",
+                "cases": before + added}  # fmt: skip
+    for name, content in (("labels.json", entries + salted), ("manifest.json", manifest)):
         part = folder / f"{name}.part"
         part.write_text(json.dumps(content, indent=1), encoding="utf-8")
         part.rename(folder / name)

@@ -14,19 +14,23 @@ if TYPE_CHECKING:
     from pneumo_ros.daq.calibration_fit import Fit
 
 
+app = typer.Typer()
+
+
+@app.command()
 def calibrate(
     points: Annotated[
         Path | None,
-        typer.Argument(help="CSV with a row a reading: channel,reference,unit,volts; repeated readings are averaged"),
+        typer.Argument(help="CSV with a row a reading: channel,reference,unit,volts; repeated readings are averaged."),
     ] = None,
-    check: Annotated[bool, typer.Option("--check", help="list what is doubtful; exit code 1 if anything is")] = False,
+    check: Annotated[bool, typer.Option("--check", help="List what is doubtful; exit code 1 if anything is.")] = False,
     calibration: Annotated[
-        str, typer.Option(help="calibration to check, or to take the other channels from: name or YAML file")
+        str, typer.Option(help="Calibration to check, or to take the other channels from: name or YAML file.")
     ] = "appendix_c",
-    output: Annotated[Path, typer.Option(help="calibration file to write")] = Path("calibration.yaml"),
-    plot: Annotated[Path | None, typer.Option(help="picture of points, lines and residuals (PNG, PDF, SVG)")] = None,
-    adc_bits: Annotated[int, typer.Option(min=8, max=32, help="width of the board's converter, bit")] = 16,
-    adc_range: Annotated[float, typer.Option(min=0.1, max=100.0, help="range of the board's inputs, +- V")] = 10.0,
+    output: Annotated[Path, typer.Option(help="Calibration file to write.")] = Path("calibration.yaml"),
+    plot: Annotated[Path | None, typer.Option(help="Picture of points, lines and residuals (PNG, PDF, SVG).")] = None,
+    adc_bits: Annotated[int, typer.Option(min=8, max=32, help="Width of the board's converter, bit.")] = 16,
+    adc_range: Annotated[float, typer.Option(min=0.1, max=100.0, help="Range of the board's inputs, +- V.")] = 10.0,
 ) -> None:
     """Fit calibration lines to measured points, as Appendix C of the thesis did, or check a calibration."""
     from pneumo_ros.errors import InputError
@@ -120,4 +124,4 @@ def _console() -> Console:
 
 
 if __name__ == "__main__":
-    typer.run(calibrate)
+    app()

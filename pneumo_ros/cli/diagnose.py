@@ -9,6 +9,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from pneumo_ros.errors import InputError
+
 if TYPE_CHECKING:
     from pneumo_ros.gap.diagnosis import Diagnosis
 
@@ -18,8 +20,12 @@ SHOWN = 5  # rows of the ranking on the terminal; the file has all
 
 @app.command()
 def diagnose(
-    fit: Annotated[list[Path], typer.Argument(help="Logs (.mcap) to fit, one or more.", metavar="FIT.mcap [more...]")],
-    output: Annotated[Path, typer.Option(help="Folder for diagnosis.json, report.html, residual.mcap.")],
+    fit: Annotated[
+        list[Path] | None, typer.Argument(help="Logs (.mcap) to fit, one or more.", metavar="FIT.mcap [more...]")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for diagnosis.json, report.html, residual.mcap; needed with logs.")
+    ] = None,
     holdout: Annotated[
         Path | None, typer.Option(help="Log that nothing is fitted to; default: the last third of the last fit log.")
     ] = None,
@@ -34,11 +40,23 @@ def diagnose(
     without: Annotated[list[str] | None, typer.Option(help="Effect id that must not compete, repeatable.")] = None,
     save_rig: Annotated[Path | None, typer.Option(help="Write the corrected rig (YAML) here.")] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
+    tables: Annotated[
+        bool, typer.Option("--tables", help="Instead of logs: what the Chapter 5 model misses in Tables 5.4 and 5.5.")
+    ] = False,
 ) -> None:
     """Diagnose the sim-to-real gap of a log: where it lies, which unmodelled effect causes it, how far it shrinks.
 
     About 20 s for two logs of 15 s at 500 Hz. The exit code is 0 whatever the verdict.
     """
+    console = Console()
+    if tables:
+        from pneumo_ros.cli.diagnose_tables import run_tables
+
+        run_tables(console, output)
+        return
+    if not fit or output is None:
+        missing = "no log to fit" if not fit else "no folder for the diagnosis"
+        raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
     from pneumo_ros.gap.diagnose import Options
     from pneumo_ros.gap.experiment import design_experiment
     from pneumo_ros.gap.report import write_outputs
@@ -46,7 +64,6 @@ def diagnose(
     from pneumo_ros.gap.saved_rig import save_corrected_rig
     from pneumo_ros.rig import load_rig
 
-    console = Console()
     task = prepared(fit, holdout, None if rig is None else load_rig(rig), edit, effect or (), without or ())
     options = Options(pairs=pairs, experiment=design_experiment)
     with _bar(console) as progress:

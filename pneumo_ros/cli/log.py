@@ -111,6 +111,22 @@ def compare(
         _show_comparison(result)
 
 
+@app.command()
+def report(
+    log: LogPath,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Page to write (.html); beside the log by default.")
+    ] = None,
+) -> None:
+    """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
+    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.session.report import write_report
+
+    target = output or log.with_suffix(".html")
+    write_report(read_log(log), target)
+    console.print(f"report   {target}", highlight=False, soft_wrap=True)
+
+
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
     console.print(_topics_table(report.topics))
@@ -218,13 +234,17 @@ def _show_comparison(result: Comparison) -> None:
     for name, (a, b) in result.counts.items():
         counts.add_row(name, str(a), str(b), "equal byte by byte" if name in result.identical else "differs")
     console.print(counts)
-    signals = Table(title="Signals", title_justify="left", box=SIMPLE_HEAD)
-    signals.add_column("topic and column", no_wrap=True)
-    for title in ("std, first", "std, second", "common", "rms difference", "largest"):
-        signals.add_column(title, justify="right")
+    signals = Table(title="Signals: std of each, difference at equal times", title_justify="left", box=SIMPLE_HEAD)
+    signals.add_column("topic, column", no_wrap=True)
+    for title in ("first", "second", "samples", "rms", "largest"):
+        signals.add_column(title, justify="right", no_wrap=True)
+    before = ""
     for s in result.signals:
-        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.4g}", f"{s.largest:.4g}"]
-        signals.add_row(f"{s.topic} {s.column}", *numbers)
+        if s.topic != before:
+            signals.add_row(s.topic)
+            before = s.topic
+        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.3g}", f"{s.largest:.3g}"]
+        signals.add_row(f"  {s.column}", *numbers)
     console.print(signals)
 
 

@@ -17,9 +17,14 @@ from pneumo_ros.errors import PneumoError
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
+    "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
+    "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
+    "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
     "log": "Look into a session log: info, validate, recover, export, compare.",
-    "diagnose": "Find where the gap between a log and the model lies, which effect makes it, how far it shrinks.",
     "view": "Show a session in the browser: a log played back, or a running session.",
+    "emulate": "Open a pseudo-terminal that behaves like the rig, with faults to inject.",
+    "calibrate": "Fit a sensor's calibration from points, or check what is in force.",
+    "thesis": "Reproduce the experiments of the thesis, its tables and its claims.",
 }
 
 

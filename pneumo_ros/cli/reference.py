@@ -1,4 +1,7 @@
-"""Write the generated tables of docs/: topics and parameters. `make docs` runs it; a test holds them up to date."""
+"""Write what is made from tables: docs/topics.md, docs/parameters.md and config/layouts/.
+
+`make docs` runs it; tests hold the files up to date.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,16 @@ from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
 from pneumo_ros.parameters import Parameter
+from pneumo_ros.session.dashboard.viewer_layouts import LAYOUTS
 from pneumo_ros.session.topics import topics_table
 
 TOPICS_HEAD = """# Topics
 
 Made from the table in `pneumo_ros/session/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
 the instant its values hold. `JointState` is used as the stamped, named standard message: its `position` holds the value
-in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position.
+in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position. On
+hardware (`pneumo run --source serial`) the node `daq` takes the place of `plant`: it publishes what the sensors of the
+real rig say under the same names.
 
 """
 PARAMETERS_HEAD = """# Parameters
@@ -41,10 +47,13 @@ def documents() -> dict[str, str]:
 
 
 def main() -> None:
-    """Write docs/ of this checkout."""
-    folder = Path(__file__).resolve().parents[2] / "docs"
+    """Write docs/ and config/layouts/ of this checkout."""
+    root = Path(__file__).resolve().parents[2]
     for name, text in documents().items():
-        (folder / name).write_text(text, encoding="utf-8")
+        (root / "docs" / name).write_text(text, encoding="utf-8")
+    for name, make in LAYOUTS.items():
+        (root / "config" / "layouts").mkdir(exist_ok=True)
+        (root / "config" / "layouts" / name).write_text(make(), encoding="utf-8")
 
 
 if __name__ == "__main__":

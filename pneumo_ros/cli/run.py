@@ -16,13 +16,14 @@ from pneumo_ros.cli.tables import summary_table, timing_table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
+    from pneumo_ros.parameters import Value
     from pneumo_ros.session.plan import Tables, Values
 
 app = typer.Typer()
 FAILED = 1
 ALIASES = {"smflc": "first_order_smflc"}
 ROAD_CLASSES = "ABCDEFGH"
-SIM_NODES = ("road_profile", "controller", "estimator", "plant", "session_recorder")
+RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
 
 @app.command()
@@ -33,6 +34,11 @@ def run(
     controller: Annotated[str, typer.Option(help="smflc, passive, or another of docs/parameters.md.")] = "smflc",
     seed: Annotated[int, typer.Option(help="Seed of road and sensor noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Control rate, Hz.")] = 500.0,
+    source: Annotated[str, typer.Option(help="sim: the simulated rig; serial: the hardware.")] = "sim",
+    port: Annotated[str, typer.Option(help="Serial port of the hardware, or of pneumo emulate.")] = "/dev/ttyACM0",
+    calibration: Annotated[
+        str, typer.Option(help="Of the hardware: name in config/calibration, or a YAML file.")
+    ] = "appendix_c",
     realtime: Annotated[bool, typer.Option("--realtime", help="Absolute deadlines instead of lockstep.")] = False,
     single_process: Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")] = False,
     rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
@@ -45,6 +51,7 @@ def run(
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
     ] = False,
+    report: Annotated[bool, typer.Option(help="Write an HTML page beside the log.")] = True,
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
@@ -53,29 +60,44 @@ def run(
 
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
-    options = _options(road, duration, speed, controller, seed, rate, realtime or view)
+    options = _options(road, duration, speed, controller, seed, rate, realtime or view, source)
+    if source == "serial":
+        options += [("daq", "port", port), ("daq", "calibration", calibration)]
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
+    values = {node: own for node, own in values.items() if node in session_nodes(source)}
     target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
-    _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": "sim"})
+    _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": source})
+    if source == "serial":
+        _check_hardware(values["daq"], single_process)
     _check(values, target)
     console = Console()
     with beside(domain_id) if view else nullcontext() as dashboard:
         _run_session(console, values, target, single_process, domain_id)
-        _report(console, target, values, picture)
+        _report(console, target, values, picture, report)
         if dashboard is not None:
             console.print("the dashboard stays until Ctrl-C")
             dashboard.wait()
 
 
+def session_nodes(source: str) -> tuple[str, ...]:
+    """Nodes of a session in the order they are stopped."""
+    if source not in RIG_NODES:
+        raise InputError("unknown source", where="--source", value=source, allowed=", ".join(RIG_NODES))
+    if source == "serial":  # the valves first: without a controller the driver would rightly trip
+        return "daq", "road_profile", "controller", "estimator", "session_recorder"
+    return "road_profile", "controller", "estimator", "plant", "session_recorder"
+
+
 def node_tables() -> Tables:
-    """Parameter table of each node of a simulated session."""
-    from pneumo_ros.nodes import controller, estimator, plant, road_profile, session_recorder
+    """Parameter table of every node a session may have."""
+    from pneumo_ros.nodes import controller, daq, estimator, plant, road_profile, session_recorder
     from pneumo_ros.nodes.base import node_parameters
 
     modules = {
         "road_profile": road_profile,
         "plant": plant,
+        "daq": daq,
         "estimator": estimator,
         "controller": controller,
         "session_recorder": session_recorder,
@@ -84,7 +106,7 @@ def node_tables() -> Tables:
 
 
 def _options(
-    road: str, duration: float, speed: float, controller: str, seed: int, rate: float, realtime: bool
+    road: str, duration: float, speed: float, controller: str, seed: int, rate: float, realtime: bool, source: str
 ) -> list[tuple[str, str, Any]]:
     """The command line's options as settings of nodes."""
     return [
@@ -92,11 +114,12 @@ def _options(
         ("road_profile", "speed_kmh", speed),
         ("road_profile", "seed", seed),
         ("plant", "seed", seed),
-        ("plant", "duration", duration),
-        ("plant", "report_progress", True),
+        ("**", "session_nodes", ",".join(session_nodes(source))),
+        (RIG_NODES[source], "duration", duration),
+        (RIG_NODES[source], "report_progress", True),
         ("controller", "controller", ALIASES.get(controller, controller)),
         ("**", "rate_hz", rate),
-        ("**", "mode", "realtime" if realtime else "lockstep"),
+        ("**", "mode", "realtime" if realtime or source == "serial" else "lockstep"),
     ]
 
 
@@ -122,7 +145,7 @@ def _check(values: Values, target: Path) -> None:
     from pneumo_ros.rig import load_rig
     from pneumo_ros.road import PARAMETERS, build_road
 
-    rig = load_rig(str(values["plant"].get("rig", "")) or None)
+    rig = load_rig(str(values["road_profile"].get("rig", "")) or None)
     trim(rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, where="road")
@@ -132,14 +155,30 @@ def _check(values: Values, target: Path) -> None:
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
 
 
+def _check_hardware(own: dict[str, Value], single_process: bool) -> None:
+    """The same for what only hardware has."""
+    from pneumo_ros.daq.calibration_file import load_calibration
+    from pneumo_ros.daq.safety_config import load_safety
+
+    if single_process:
+        raise InputError("hardware needs a process of its own", where="--single-process", remedy="leave it out")
+    load_calibration(str(own["calibration"]))
+    load_safety(str(own.get("safety", "")) or None)
+    if not Path(str(own["port"])).exists():
+        raise InputError(
+            "no such port", where="--port", value=own["port"], remedy="plug it in, or start pneumo emulate"
+        )
+
+
 def _run_session(console: Console, values: Values, target: Path, single_process: bool, domain_id: int | None) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
 
-    names = ("single_process",) if single_process else SIM_NODES
+    rig_node = "daq" if "daq" in values else "plant"
+    names = ("single_process",) if single_process else session_nodes("serial" if rig_node == "daq" else "sim")
     nodes = [NodeProcess(name, f"pneumo_ros.nodes.{name}") for name in names]
-    lead = "single_process" if single_process else "plant"
+    lead = "single_process" if single_process else rig_node
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -147,7 +186,7 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    length = float(values["plant"]["duration"])
+    length = float(values[rig_node]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # both end the session in order
@@ -184,8 +223,8 @@ def _save_what_is_left(target: Path) -> None:
     out.print(f"recovered {found.kept} messages: {found.output}")
 
 
-def _report(console: Console, target: Path, values: Values, picture: bool) -> None:
-    """Table of the active run beside passive valves on the same road, and the picture."""
+def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+    """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.session.passive import passive_twin
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
@@ -202,6 +241,13 @@ def _report(console: Console, target: Path, values: Values, picture: bool) -> No
         png = target.with_suffix(".png")
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}")
+    if page:
+        from pneumo_ros.session.reading import read_log
+        from pneumo_ros.session.report import write_report
+
+        html = target.with_suffix(".html")
+        write_report(read_log(target), html, other)
+        console.print(f"report   {html}")
 
 
 if __name__ == "__main__":

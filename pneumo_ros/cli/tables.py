@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 from rich import box
 from rich.table import Table
 
+from pneumo_ros.session.summary import ride_rows
 from pneumo_ros.units import SQUARE_INCH
 
 if TYPE_CHECKING:
-    from pneumo_ros.comfort import Ride
     from pneumo_ros.session.summary import Summary
 
 PERCENTILES = ("p50", "p99", "max")
-Row = tuple[str, str, list[float], str]
 
 
 def summary_table(active: Summary, passive: Summary | None) -> Table:
@@ -25,8 +24,8 @@ def summary_table(active: Summary, passive: Summary | None) -> Table:
     table.add_column("f / r: front / rear", no_wrap=True)
     for column in ("session", "passive", "change") if passive is not None else ("session",):
         table.add_column(column, justify="right", no_wrap=True)
-    theirs = _ride_rows(passive.ride) if passive is not None and passive.ride is not None else []
-    for index, (name, unit, values, form) in enumerate(_ride_rows(active.ride) if active.ride is not None else []):
+    theirs = ride_rows(passive.ride) if passive is not None and passive.ride is not None else []
+    for index, (name, unit, values, form) in enumerate(ride_rows(active.ride) if active.ride is not None else []):
         cells = [f"{name} ({unit})", _shown(values, form)]
         if theirs:
             other = theirs[index][2]
@@ -40,17 +39,6 @@ def summary_table(active: Summary, passive: Summary | None) -> Table:
         table.caption = "passive: valves at trim on the same road, simulated"
         table.caption_justify = "left"
     return table
-
-
-def _ride_rows(ride: Ride) -> list[Row]:
-    return [
-        ("heave accel., rms", "m/s2", [ride.heave_rms], "%.3f"),
-        ("same, full scale", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
-        ("pitch accel., rms", "rad/s2", [ride.pitch_rms], "%.3f"),
-        ("mean personal rating", "0-5", [ride.rating], "%.2f"),
-        ("tyre load variation, f / r", "%", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
-        ("travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
-    ]
 
 
 def _shown(values: list[float], form: str) -> str:

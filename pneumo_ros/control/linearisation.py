@@ -1,4 +1,4 @@
-"""The feedback linearisation core: from a wanted rate of spring force to valve openings (Eqs. 6.13-6.17, 6.63-6.73).
+"""The feedback linearisation core: from a wanted rate of spring force to valve openings (Eqs. 6.7-6.17, 6.63-6.73).
 
 The thesis inverts the 2 x 2 matrix B of Eq. 6.73. B factors into the body's geometry and one gain a spring, so the same
 inverse is two steps: outputs' third derivatives -> force rates (geometry alone), force rate -> opening (one spring
@@ -58,7 +58,7 @@ class Compensation(NamedTuple):
 
 @njit(cache=True)
 def believed_volume(height: float, estimate: float, gas: Gas) -> tuple[float, float]:
-    """Volume, m3, and dV/dh, m2: the spring's own, or a constant ``estimate`` > 0 whose mean area is V/h (Eq. 4.26)."""
+    """Volume, m3, and dV/dh, m2: the spring's, or a constant ``estimate`` > 0 with V/h (Eqs. 4.25-4.27)."""
     if estimate > 0.0:
         return estimate, estimate / max(height, SMALLEST_HEIGHT)
     return gas.volume_offset + gas.mean_area * height, gas.mean_area

@@ -34,7 +34,7 @@ class Belief(NamedTuple):
     area : constant effective area, m2; 0 uses the estimator's
     volume : constant volume, m3; 0 knows it
     height_error : added to the height it reads, m
-    mass : sprung mass, kg
+    mass : sprung mass, kg; taken too large, the estimated area is too large by the same factor (Eqs. 6.56-6.57)
     """
 
     area: float

@@ -32,8 +32,8 @@ class ClockSettings:
     correction_limit_ns : half a round trip above this is not believed to be symmetric
     """
 
-    bin_ns: int = SECOND // 4
-    bins: int = 40
+    bin_ns: int = SECOND // 10
+    bins: int = 100
     drift_after_ns: int = 2 * SECOND
     drift_limit: float = 5e-3
     correction_limit_ns: int = 5_000_000
@@ -60,12 +60,12 @@ class DeviceClock:
         self._bin = 0
         self._low: tuple[int, int] = (0, 0)
         self._lows: deque[tuple[int, int]] = deque(maxlen=self.settings.bins)
-        self._receipts: deque[tuple[int, int]] = deque(maxlen=10 * self.settings.bins)
+        self._receipts: deque[tuple[int, int]] = deque(maxlen=2 * self.settings.bins)
 
     @property
     def settled(self) -> bool:
-        """Whether four bins are complete, so that one late start no longer shows."""
-        return len(self._lows) >= 4
+        """Whether five bins are complete, so that one late start no longer shows."""
+        return len(self._lows) >= 5
 
     @property
     def correction_ns(self) -> float:

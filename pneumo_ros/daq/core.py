@@ -20,6 +20,7 @@ from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.daq.scaling import check_map, output_scale
 from pneumo_ros.daq.stream import StreamDecoder
 from pneumo_ros.errors import InputError
+from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
 
 HELLO_EVERY = SECOND // 5  # between handshake attempts
@@ -28,6 +29,7 @@ SILENT_FOR = SECOND // 2  # of silence after which the handshake starts again
 WINDOW = SECOND  # over which lost frames are judged
 MIN_WINDOW_FRAMES = 100
 COMPLAINT_EVERY = SECOND  # between events about refused commands
+UNWATCHED = SECOND // 10  # without a tick, after which no command passes: nobody is watching the timeouts
 
 
 class Phase(Enum):
@@ -58,6 +60,8 @@ class DriverCore:
         discard: Callable[[], None] = lambda: None,
     ) -> None:
         self.safety, self.calibration, self.rig = safety, calibration, rig
+        self._surface = load_surface()
+        effective_area(rig.design_height.value, 1e5, self._surface)  # loads the compiled code before it is urgent
         self.phase = Phase.CLOSED
         self.decoder = StreamDecoder()
         self.actuation = Actuation(safety, send, discard)
@@ -74,6 +78,7 @@ class DriverCore:
         self._silent = False
         self._window = (0, 0, 0)
         self._last_complaint = -COMPLAINT_EVERY
+        self._last_tick = 0
 
     @property
     def mode(self) -> Mode:
@@ -117,6 +122,7 @@ class DriverCore:
 
     def tick(self, now: int) -> None:
         """Call every 2 ms or so: timeouts, handshakes, keep-alives."""
+        self._last_tick = now
         if self.phase is Phase.RUNNING:
             self._watch_samples(now)
             self._watch_frames(now)
@@ -154,7 +160,7 @@ class DriverCore:
             self.phase = Phase.REFUSED
             self._finding_event(Finding(Reason.BOARD_REFUSED, "board", str(error)), now)
             return
-        self.intake = Intake(hello, self.calibration, self.safety, self.rig)
+        self.intake = Intake(hello, self.calibration, self.safety, self.rig, self._surface)
         self.actuation.board(scale)
         self.phase, self.status, self.last = Phase.RUNNING, None, None
         self._last_sample, self._silent = now, False
@@ -199,6 +205,9 @@ class DriverCore:
         measurement, found = self.intake.take(sample, now)
         self._last_sample, self._silent = now, False
         self._follow_board(sample, now)
+        if self.intake.recent_loss > self.safety.plausibility.lost_at_once:
+            text = f"{self.intake.recent_loss:.0%} of the last frames lost"
+            found.append(Finding(Reason.FRAMES_LOST, "link", text))
         for finding in found:
             self._handle(finding, now)
         if measurement is not None:
@@ -273,6 +282,8 @@ class DriverCore:
 
     def command(self, areas: Sequence[float], stamp: int, now: int) -> None:
         """A controller's command: m2 in the order of VALVES, computed for the sample of monotonic time ``stamp``."""
+        if self.mode is Mode.ARMED and now - self._last_tick > UNWATCHED:
+            self.fail("its supervision has stopped", now)
         finding = self.actuation.command(areas, stamp, now)
         if finding is None:
             return
@@ -280,7 +291,7 @@ class DriverCore:
             self._make_safe(finding, now)
         elif now - self._last_complaint >= COMPLAINT_EVERY:
             self._last_complaint = now
-            self._finding_event(finding, now)
+            self._finding_event(finding._replace(level=Level.WARN), now)  # an error once the driver trips over it
 
     def blockers(self, now: int) -> list[str]:
         """Why the valves cannot be armed; empty if they can."""
@@ -290,7 +301,7 @@ class DriverCore:
         if self._silent:
             out.append("the board is silent")
         if not self.intake.clock.settled:
-            out.append("the device clock is not settled yet (1 s)")
+            out.append("the device clock is not settled yet (0.5 s)")
         if not all(self.last.valid):
             out.append("a sensor cannot be believed")
         supply = self.last.values[6]
@@ -327,8 +338,12 @@ class DriverCore:
             self.actuation.reset_estop(now)
         return why
 
+    def fail(self, why: str, now: int) -> None:
+        """Something in the driver itself broke: valves safe, whatever else still works."""
+        self._make_safe(Finding(Reason.DRIVER_FAILED, "driver", why), now)
+
     def use(self, calibration: Calibration, now: int) -> None:
-        """Take another calibration (zero, span); refused while armed by the caller."""
+        """Take another calibration (zero, span); the caller sees to it that nothing is armed."""
         self.calibration = calibration
         if self.intake is not None:
             self.intake.use(calibration)

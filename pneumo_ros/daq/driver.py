@@ -8,6 +8,7 @@ import select
 import termios
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeVar
@@ -28,6 +29,7 @@ BAUD = 921_600
 TICK = 0.002  # s between looks at the timeouts
 REOPEN = 0.1  # s between attempts to open the port
 READ_SIZE = 4096
+LATENESS_KEPT = 5000
 POLL = 0.05  # s the reader waits for bytes before it looks whether to stop
 T = TypeVar("T")
 
@@ -56,6 +58,7 @@ class SerialDriver:
         self.port, self.baud = port, baud
         self.core = DriverCore(safety, calibration, rig, self._write, self._discard)
         self.dropped_writes = 0
+        self.lateness_ns: deque[tuple[int, int]] = deque(maxlen=LATENESS_KEPT)  # (when, how late a look was)
         self._on_measurement, self._on_event = on_measurement, on_event
         self._serial: serial.Serial | None = None
         self._lock = threading.RLock()
@@ -64,7 +67,7 @@ class SerialDriver:
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._collected: list[Measurement] | None = None
-        self._complained = False
+        self._complained = self._failed = False
 
     # -- life ------------------------------------------------------------------------------------------------------
 
@@ -79,7 +82,7 @@ class SerialDriver:
         self._open_port()
         self._stop.clear()
         self._threads = [
-            threading.Thread(target=target, name=name, daemon=True)
+            threading.Thread(target=self._guarded, args=(target,), name=name, daemon=True)
             for target, name in ((self._read_forever, "daq-reader"), (self._supervise, "daq-supervisor"))
         ]
         for thread in self._threads:
@@ -158,7 +161,23 @@ class SerialDriver:
         """Take another calibration."""
         self._do(lambda now: self.core.use(calibration, now))
 
+    @property
+    def failed(self) -> bool:
+        """Whether one of the driver's threads has ended by an error; it then drives no valve any more."""
+        return self._failed
+
     # -- threads ---------------------------------------------------------------------------------------------------
+
+    def _guarded(self, target: Callable[[], None]) -> None:
+        """Run a thread; if it breaks, the valves are made safe and the driver ends."""
+        try:
+            target()
+        except Exception as error:
+            self._failed = True
+            self._stop.set()
+            text = f"{threading.current_thread().name}: {type(error).__name__}: {error}"
+            self._do(partial(self.core.fail, text))
+            raise
 
     def _do(self, action: Callable[[int], T]) -> T:
         with self._changed:
@@ -209,8 +228,11 @@ class SerialDriver:
             self._do(partial(self.core.receive, data))
 
     def _supervise(self) -> None:
-        next_open = 0.0
+        next_open, due = 0.0, time.monotonic_ns()
         while not self._stop.wait(TICK):
+            now = time.monotonic_ns()
+            self.lateness_ns.append((now, now - due - round(TICK * 1e9)))
+            due = now
             if self._serial is None and time.monotonic() >= next_open:
                 next_open = time.monotonic() + REOPEN
                 self._try_open()

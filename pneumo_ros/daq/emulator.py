@@ -71,6 +71,7 @@ class Emulator:
         self._backlog = bytearray()
         self._state = DeviceState.SAFE
         self._dark_until = 0
+        self._heard_ns = 0
         self._boots = 0
         self.stopped = False
 
@@ -224,6 +225,7 @@ class Emulator:
         now, silent = min(time.monotonic_ns(), due), self._active.get("silent")
         if now < self._dark_until or (silent is not None and silent.number("deaf")):
             return
+        self._heard_ns = time.monotonic_ns()
         self.device.receive(self._line.pass_through(data, *self._rates()), self._device_us(now))
         self._note_state(time.monotonic_ns())
 
@@ -271,7 +273,8 @@ class Emulator:
     def _write_outputs(self, counts: tuple[int, ...]) -> None:
         self.simulation.write_outputs(counts)
         safe = counts == tuple(entry.safe for entry in self.simulation.hello.outputs)
-        self.record.outputs(time.monotonic_ns(), safe)
+        if self.record.outputs(time.monotonic_ns(), safe) and safe:
+            self.record.event(self._heard_ns, "last_heard", "")
 
     def _note_state(self, now: int) -> None:
         state = self.device.state

@@ -13,12 +13,14 @@ from pneumo_ros.daq.plausibility import PlausibilityMonitor
 from pneumo_ros.daq.reasons import Finding, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.daq.scaling import input_scale
+from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.rig import Rig
 
 WRAP = 1 << 32
 MAX_GAP = 1 << 31  # sequences further ahead than this are behind
 MISFITS = 10  # samples in a row that do not continue the last good one: another board, or it has restarted
 LATENCIES = 2000  # kept for the percentiles
+LOSS_MEMORY = 40  # frames over which the recent loss forgets
 
 
 class Measurement(NamedTuple):
@@ -49,13 +51,17 @@ class Intake:
     ----------
     hello : the board
     calibration, safety, rig : configuration
+    surface : effective area, already loaded: nothing may wait once the samples come
     """
 
-    def __init__(self, hello: Hello, calibration: Calibration, safety: SafetyConfig, rig: Rig) -> None:
-        self.hello, self.rig, self._safety = hello, rig, safety
+    def __init__(
+        self, hello: Hello, calibration: Calibration, safety: SafetyConfig, rig: Rig, surface: AreaSurface
+    ) -> None:
+        self.hello, self.rig, self._safety, self._surface = hello, rig, safety, surface
         self.clock = DeviceClock()
         self.limits = LimitMonitor(safety.limits)
         self.samples = self.lost = self.out_of_step = 0
+        self.recent_loss = 0.0  # share of frames lost, exponentially forgotten
         self.rails: Counter[str] = Counter()
         self.latencies_ns: deque[int] = deque(maxlen=LATENCIES)
         self._last: Sample | None = None
@@ -74,7 +80,7 @@ class Intake:
         self.calibration = calibration
         self.scale = input_scale(calibration, self.hello, self.rig.ambient_pressure.value)
         period = self.hello.sample_period_us * 1e-6
-        self.plausibility = PlausibilityMonitor(self._safety.plausibility, self.scale, self.rig, period)
+        self.plausibility = PlausibilityMonitor(self._safety.plausibility, self.scale, self.rig, period, self._surface)
         self.limits.reset()
 
     def take(self, sample: Sample, arrival_ns: int) -> tuple[Measurement | None, list[Finding]]:
@@ -115,6 +121,8 @@ class Intake:
 
     def _accept(self, sample: Sample, lost: int) -> None:
         self._last, self._misfits = sample, 0
+        kept = (1.0 - 1.0 / LOSS_MEMORY) ** min(lost, LOSS_MEMORY * 10)
+        self.recent_loss = (1.0 - kept * (1.0 - self.recent_loss)) * (1.0 - 1.0 / LOSS_MEMORY)
         self.samples += 1
         self.lost += lost
 

@@ -12,7 +12,7 @@ from pneumo_ros.daq.calibration import SENSORS
 from pneumo_ros.daq.reasons import Finding, Reason
 from pneumo_ros.daq.safety_config import Plausibility
 from pneumo_ros.daq.scaling import InputScale
-from pneumo_ros.plant.air_spring import AreaSurface, effective_area, load_surface
+from pneumo_ros.plant.air_spring import AreaSurface, effective_area
 from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import GRAVITY
@@ -44,9 +44,10 @@ class PlausibilityMonitor:
     scale : of the board, which gives rails and the worth of a count
     rig : declared sensor noise, and the loads of the springs
     period : s between samples
+    surface : effective area
     """
 
-    def __init__(self, config: Plausibility, scale: InputScale, rig: Rig, period: float) -> None:
+    def __init__(self, config: Plausibility, scale: InputScale, rig: Rig, period: float, surface: AreaSurface) -> None:
         self.config, self._scale, self._period = config, scale, period
         noises = [rig.displacement_noise.value] * DISPLACEMENTS + [rig.pressure_noise.value] * 3
         runs = [
@@ -57,7 +58,7 @@ class PlausibilityMonitor:
         ranges = [config.displacement_range] * DISPLACEMENTS + [config.pressure_range] * 3
         rates = [config.displacement_rate] * DISPLACEMENTS + [config.pressure_rate] * 3
         self._bounds = [(*r, rate) for r, rate in zip(ranges, rates, strict=True)]
-        self.balance = ForceBalance(rig, config.force_balance, config.force_balance_window)
+        self.balance = ForceBalance(rig, config.force_balance, config.force_balance_window, surface)
         self.reset()
 
     @property
@@ -122,9 +123,9 @@ class ForceBalance:
     spring sits on its bump stop, which then carries part of the load.
     """
 
-    def __init__(self, rig: Rig, tolerance: float, window: float, surface: AreaSurface | None = None) -> None:
+    def __init__(self, rig: Rig, tolerance: float, window: float, surface: AreaSurface) -> None:
         self._tolerance, self._window = tolerance, window
-        self._surface = surface or load_surface()
+        self._surface = surface
         self._ambient, self._area_scale = rig.ambient_pressure.value, rig.effective_area_scale.value
         weight, base = rig.sprung_mass.value * GRAVITY, rig.wheelbase
         self._loads = (weight * rig.rear_arm.value / base, weight * rig.front_arm.value / base)

@@ -35,11 +35,13 @@ class EmulatorRecord:
         """Something happened."""
         self.events.append((time_ns, kind, text))
 
-    def outputs(self, time_ns: int, safe: bool) -> None:
-        """The valves' drive was set; only changes between safe and not safe are kept."""
-        if safe is not self._safe:
-            self._safe = safe
-            self.event(time_ns, "valves", "safe" if safe else "driven")
+    def outputs(self, time_ns: int, safe: bool) -> bool:
+        """The valves' drive was set; only changes between safe and not safe are kept. Says whether this was one."""
+        if safe is self._safe:
+            return False
+        self._safe = safe
+        self.event(time_ns, "valves", "safe" if safe else "driven")
+        return True
 
     def arrays(self) -> dict[str, NDArray[np.int64] | NDArray[np.float64]]:
         """boot, sequence and time_ns (N,), counts (N, 7), states (N, 10), lateness_ns (M,)."""

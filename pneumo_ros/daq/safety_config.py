@@ -74,6 +74,7 @@ class Plausibility:
     force_balance: float
     force_balance_window: float
     lost_frames: float
+    lost_at_once: float
 
 
 @dataclass(frozen=True)

@@ -68,9 +68,9 @@ class RigSimulation:
         self._areas = np.clip(self._outputs.areas(counts), 0.0, self.rig.inlet_area_max.value)
 
     def start_road(self) -> None:
-        """The shaker begins with the next period."""
+        """The road's first height holds at the next sample: the one that will be the first of the armed board."""
         if self._road_index is None:
-            self._road_index = 0
+            self._road_index = -1
 
     def set_supply(self, pressure: float) -> None:
         """Another supply pressure, Pa absolute, from now on."""
@@ -115,7 +115,8 @@ class RigSimulation:
         return self._inputs.places[SENSORS.index(channel)]
 
     def _road_ends(self) -> NDArray[np.float64]:
-        if self._road_index is None:
+        if self._road_index is None or self._road_index < 0:
+            self._road_index = None if self._road_index is None else 0
             return np.zeros((2, 2))
         block, row = divmod(self._road_index, ROAD_BLOCK)
         if block != self._block:

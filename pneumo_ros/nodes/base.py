@@ -25,6 +25,7 @@ from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
+from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
@@ -54,6 +55,7 @@ COMMON: tuple[Parameter, ...] = (
 ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
+GAP_PERIODS = 10  # control periods without a sample after which estimator and controller begin afresh
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -96,6 +98,8 @@ class RigNode(Node):
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
+        if "daq" in str(self.values["session_nodes"]).split(","):
+            prefer_this_process()  # hardware does not wait for other programs
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
@@ -193,6 +197,10 @@ class RigNode(Node):
         """Called when the session ends, after the last callback; what was published is delivered first."""
         for _, made in self._outgoing:
             made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
+
+    def continues(self, stamp_ns: int, last_ns: int) -> bool:
+        """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
+        return 0 <= stamp_ns - last_ns <= GAP_PERIODS * self.period_ns
 
     # -- health ----------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,8 @@ from rclpy.context import Context
 
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.half_car import Controller, build_controller
-from pneumo_ros.nodes.base import ERROR, RigNode
+from pneumo_ros.daq.safety_config import load_safety
+from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
@@ -21,12 +22,20 @@ from pneumo_ros.session.cdr import JointDecoder, JointEncoder
 
 PARAMETERS: tuple[Parameter, ...] = (
     *CONTROL_PARAMETERS,
+    Parameter("safety", "", "", "safety file (YAML); empty for config/safety.yaml", read_only=True),
     Parameter("telemetry_every", 5, "1", "publish /controller/sliding every so many steps", 1, 1000, read_only=True),
 )
 
 
+WATCH_PERIOD = 0.004  # s between looks at the estimate's age, real time only
+
+
 class ControllerNode(RigNode):
-    """Thin shell over :mod:`pneumo_ros.control.half_car`."""
+    """Thin shell over :mod:`pneumo_ros.control.half_car`.
+
+    In real time it is the first of three watchdogs: without a fresh estimate it sends the safe command, whatever the
+    driver and the board behind it do.
+    """
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         super().__init__("controller", PARAMETERS, context=context, overrides=overrides)
@@ -42,7 +51,13 @@ class ControllerNode(RigNode):
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
+        self._last_ns = self._last_stamp = 0
         self._refused = 0
+        self._stale = False
+        safety = load_safety(self.values["safety"] or None)
+        self._closed, self._timeout_ns = np.array(safety.safe_command), round(safety.timeouts.estimate * 1e9)
+        if not self.lockstep:
+            self.create_timer(WATCH_PERIOD, self._watch)
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
     def _build(self) -> Controller:
@@ -56,8 +71,9 @@ class ControllerNode(RigNode):
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, estimate = self._read(data)
-        if self.state is None:
+        if self.state is None or not self.continues(stamp, self._last_stamp):
             self.state = self.controller.init(estimate)
+        self._last_ns, self._last_stamp, self._stale = start, stamp, False
         state, command, telemetry = self.controller.step(self.state, estimate)
         if math.isfinite(command[0] + command[1] + command[2] + command[3]):
             self.state = state
@@ -69,6 +85,16 @@ class ControllerNode(RigNode):
             self._publish_sliding(self._sliding(stamp, shown))
         self._steps += 1
         self.timed(start)
+
+    def _watch(self) -> None:
+        """Safe command for as long as no fresh estimate comes; monotonic time."""
+        age = time.monotonic_ns() - self._last_ns
+        if not self._last_ns or age <= self._timeout_ns:
+            return
+        if not self._stale:
+            self._stale = True
+            self.event(WARN, "estimate_stale", f"no estimate for {age / 1e6:.1f} ms: safe command")
+        self._publish(self._command(self.get_clock().now().nanoseconds, self._closed))
 
     def _refuse(self, stamp: int) -> NDArray[np.float64]:
         """Valves at trim instead of a command that is not finite; said once a second at most."""

@@ -29,6 +29,7 @@ class EstimatorNode(RigNode):
         self.state: EstimatorState | None = None
         self._sample = np.zeros(6)
         self._stamps = [0, 0, 0]
+        self._last_stamp = 0
         self._encode = JointEncoder(topics.ESTIMATE.frame_id, topics.ESTIMATE.names).encode_array
         self._publish = self.publisher(topics.ESTIMATE).publish
         self._read = JointDecoder(topics.DISPLACEMENT.name, topics.DISPLACEMENT.names).decode_array
@@ -58,8 +59,9 @@ class EstimatorNode(RigNode):
         if stamp != self._stamps[1] or stamp != self._stamps[2]:
             return
         start = time.monotonic_ns()
-        if self.state is None:
+        if self.state is None or not self.continues(stamp, self._last_stamp):
             self.state = self.estimator.init(self._sample)
+        self._last_stamp = stamp
         self.state, estimate = self.estimator.step(self.state, self._sample)
         self._publish(self._encode(stamp, estimate))
         self.timed(start)

@@ -212,7 +212,7 @@ def outlet_flow(area: float, pressure: float, power: float, gas: Gas) -> float:
 
 @njit(cache=True, error_model="numpy")
 def pressure_rate(pressure: float, height: float, height_rate: float, inlet: float, outlet: float, gas: Gas) -> float:
-    """dP/dt of Eq. 4.22, Pa/s.
+    """dP/dt of Eq. 4.22, Pa/s: the gas law differentiated (Eqs. 4.13-4.19) with the flows in (Eqs. 4.20-4.21).
 
     Parameters
     ----------

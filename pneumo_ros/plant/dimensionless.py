@@ -1,7 +1,8 @@
 """The dimensionless equations, in Pi-numbers alone: two cars with equal Pi-numbers are one car here.
 
 Conventional half car: Eqs. 3.39-3.42 with their typing corrected (signs of pitch as in the plant, damping ratios over
-damping, own forces). Pneumatic: Eqs. 4.42, 4.61, 4.76, with gauge pressure and gravity written out, which adds three
+damping, own forces). Pneumatic: Eqs. 4.42, 4.61, 4.76-4.78 in
+the variables of Eqs. 4.30-4.41 and 4.56-4.58, with gauge pressure and gravity written out, which adds three
 numbers the thesis hides: g/(h w^2), P3/P1 and c/(m w).
 """
 

@@ -122,7 +122,7 @@ def response(frequency: float, amplitude: float, bench: Bench, surface: AreaSurf
 
 
 def natural_frequency(bench: Bench, surface: AreaSurface) -> float:
-    """Undamped natural frequency, Hz, of small motion: slope of the static force by central differences."""
+    """Undamped natural frequency, Hz, of small motion: slope of the force (Eqs. 5.9-5.10)."""
     step = 1e-6
     up = bench_acceleration(step, 0.0, 0.0, 0.0, bench, surface)
     down = bench_acceleration(-step, 0.0, 0.0, 0.0, bench, surface)

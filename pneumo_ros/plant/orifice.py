@@ -1,6 +1,6 @@
 """Mass flow of air through an orifice, polytropic, clamped at the critical ratio, with a check valve.
 
-Source: Eq. 4.7 (SI form, errata 5) with the critical clamp; Eqs. 4.8 and 4.12 in the corrected form of errata 4.
+Source: Eqs. 4.1-4.7 (SI form, errata 5) with the critical clamp; Eqs. 4.8 and 4.12 in the corrected form of errata 4.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Dimensional analysis by linear algebra, and the scaling laws between a full-scale car and the rig.
 
-Eqs. 3.5-3.34 (Pi-numbers), 3.43-3.49, 4.43-4.52, 4.62, 4.79-4.80 (laws). Only the dimensions
+Eqs. 3.5-3.34 (Pi-numbers); Eqs. 3.43-3.54, 4.43-4.52, 4.62, 4.79-4.80 (laws). Only the dimensions
 of the quantities are typed in; the printed Pi-numbers and laws are what the tests compare with.
 """
 
@@ -43,7 +43,8 @@ Powers = dict[str, Fraction]
 
 
 def pi_number(quantity: str, primary: Sequence[str] = HALF_CAR_PRIMARY) -> Powers:
-    """Powers that make a quantity dimensionless: {quantity: 1, primary: -e, ...} (Eqs. 3.5-3.15).
+    """Powers that make a quantity dimensionless: {quantity: 1, primary: -e, ...} (Eqs. 3.5-3.15);
+    empty for a primary quantity, which is its own unit.
 
     The quantity's row of the dimensional table is a combination e of the primary rows; the Pi-number divides by it.
 
@@ -60,7 +61,10 @@ def pi_number(quantity: str, primary: Sequence[str] = HALF_CAR_PRIMARY) -> Power
     if not np.allclose(rows @ powers, target, atol=1e-9):
         raise InputError(f"no Pi-number of {quantity}", key="primary", value=tuple(primary), allowed="a spanning set")
     exact = [Fraction(float(p)).limit_denominator(12) for p in powers]
-    return {quantity: Fraction(1), **{name: -e for name, e in zip(primary, exact, strict=True) if e}}
+    found: Powers = {quantity: Fraction(1)}
+    for name, power in zip(primary, exact, strict=True):
+        found[name] = found.get(name, Fraction(0)) - power
+    return {name: power for name, power in found.items() if power}
 
 
 def representative_pi_numbers() -> dict[str, Powers]:

@@ -118,6 +118,18 @@ def area_error(session: Recorded) -> tuple[float, float] | None:
     return front, rear
 
 
+def ride_rows(ride: Ride) -> list[tuple[str, str, list[float], str]]:
+    """(name, unit, values, format) of every figure of a ride, for tables."""
+    return [
+        ("heave accel., rms", "m/s2", [ride.heave_rms], "%.3f"),
+        ("same, full scale", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
+        ("pitch accel., rms", "rad/s2", [ride.pitch_rms], "%.3f"),
+        ("mean personal rating", "0-5", [ride.rating], "%.2f"),
+        ("tyre load variation, f / r", "%", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
+        ("travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
+    ]
+
+
 def static_tyre_loads(rig: Rig) -> tuple[float, float]:
     """Front and rear tyre load at rest, N."""
     a, b = rig.front_arm.value, rig.rear_arm.value

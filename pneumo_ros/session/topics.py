@@ -77,7 +77,7 @@ REAR_PRESSURE = Topic(
     frame_id="rear_air_spring", fields=(("fluid_pressure", "Pa"), ("variance", "Pa2")),
 )  # fmt: skip
 COMMAND = Topic(
-    "/valve/command", JOINT, "commanded orifice areas, held until the next", "controller", ("plant",),
+    "/valve/command", JOINT, "commanded orifice areas, held until the next", "controller", ("plant", "daq"),
     frame_id="manifold",
     fields=(("front_inlet", "m2"), ("rear_inlet", "m2"), ("front_outlet", "m2"), ("rear_outlet", "m2")),
 )  # fmt: skip
@@ -153,16 +153,33 @@ DIAGNOSTIC = Topic(
 )  # fmt: skip
 ESTOP = Topic(
     "/rig/estop", "std_msgs/msg/Bool", "emergency stop: true latches it, false does nothing; released by service only",
-    "", ("plant",), flow=Flow.EVENTS,
+    "", ("plant", "daq"), flow=Flow.EVENTS,
 )  # fmt: skip
 READY = Topic(
-    "/rig/ready", STRING, "name of a node whose publishers have all their subscribers", "", ("plant",),
+    "/rig/ready", STRING, "name of a node whose publishers have all their subscribers", "", ("plant", "daq"),
     flow=Flow.EVENTS, recorded=False,
+)  # fmt: skip
+
+RAW = Topic(
+    "/rig/raw", JOINT, "converter counts of every sample as they came, also before arming (hardware only)", "daq",
+    frame_id="converter",
+    fields=(
+        ("sprung_front", "count"), ("sprung_rear", "count"), ("unsprung_front", "count"), ("unsprung_rear", "count"),
+        ("front_pressure", "count"), ("rear_pressure", "count"), ("supply_pressure", "count"),
+    ),
+)  # fmt: skip
+SUPPLY_PRESSURE = Topic(
+    "/rig/supply/pressure", PRESSURE, "air supply, absolute (hardware only)", "daq",
+    frame_id="supply", fields=(("fluid_pressure", "Pa"), ("variance", "Pa2")),
+)  # fmt: skip
+CALIBRATION = Topic(
+    "/rig/calibration", STRING, "calibration in use, YAML, at start and after zero or span (hardware only)", "daq",
+    flow=Flow.EVENTS,
 )  # fmt: skip
 
 TOPICS: tuple[Topic, ...] = (
     ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
-    EVENTS, DIAGNOSTIC, ESTOP, READY,
+    EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, CALIBRATION,
 )  # fmt: skip
 MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
 BY_NAME = {topic.name: topic for topic in TOPICS}

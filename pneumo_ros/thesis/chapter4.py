@@ -4,10 +4,22 @@ from __future__ import annotations
 
 import math
 
+from pneumo_ros.plant.air_spring import effective_area, load_surface, spring_volume
 from pneumo_ros.plant.similitude import HONDA_CIVIC, Scales
-from pneumo_ros.thesis.report import Chapter, Claim, Step, Table
+from pneumo_ros.thesis.chapter5 import read_table
+from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.thesis.similitude_proof import SYSTEMS, difference, laws_of
+from pneumo_ros.units import (
+    ATMOSPHERE,
+    CUBIC_INCH,
+    INCH,
+    POUND_FORCE,
+    POUND_MASS,
+    PSI,
+    SQUARE_INCH,
+    psig_to_pa_absolute,
+)
 
 STEPS = 3
 PNEUMATIC = SYSTEMS[1:]
@@ -21,17 +33,60 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
     step("similitude with one law broken")
     broken = {name: {law: difference(name, HONDA_CIVIC, law)[0] for law in laws_of(name)} for name in PNEUMATIC}
     step("scaling laws")
-    tables = [_kept_table(kept), _broken_table(broken)]
+    tables = [_volume_table(), _stiffness_table(), _kept_table(kept), _broken_table(broken)]
     claims = [
         _laws_claim(),
         *[_similar_claim(name, kept[name]) for name in PNEUMATIC],
         _nature_claim(broken["half car"]),
     ]
     lead = (
-        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the inlets open "
+        "Full-scale and scaled cars and the equations in Pi-numbers are simulated over one bumpy road while the "
+        "inlets open "
         "to three times trim; differences are in standard deviations of each state."
     )
     return Chapter(4, "Nonlinear model of pneumatic suspensions", lead, claims, tables)
+
+
+def _volume_table() -> Table:
+    heights, _, values = read_table("table_4_1_firestone_2m2a.csv")
+    rows = []
+    for height, volume in zip(heights, values[:, 0], strict=True):
+        ours = float(spring_volume(height * INCH)) / CUBIC_INCH
+        rows.append([f"{height:g}", f"{ours:.3f} | {volume:g}"])
+    return Table(
+        "Table 4.1: volume, in3", ["height, in", "V(h) used here | printed"], rows, "least squares line, errata 6"
+    )
+
+
+def stiffness_lb_in(gauge_psig: float) -> float:
+    """Adiabatic stiffness of the plant's air spring at 1.8 in, lb/in, sealed: gas, area and their product."""
+    surface, height, step = load_surface(), 1.8 * INCH, 1e-5
+
+    def force(h: float) -> float:
+        pressure = psig_to_pa_absolute(gauge_psig) * (spring_volume(height) / spring_volume(h)) ** 1.4
+        gauge = pressure - ATMOSPHERE
+        return gauge * float(effective_area(h, gauge, surface))
+
+    return (force(height - step) - force(height + step)) / (2.0 * step) * INCH / POUND_FORCE
+
+
+def _stiffness_table() -> Table:
+    pressures, _, values = read_table("table_4_2_firestone_dynamic.csv")
+    rows = []
+    for gauge, row in zip(pressures, values, strict=True):
+        load = gauge * float(effective_area(1.8 * INCH, gauge * PSI, load_surface())) / SQUARE_INCH
+        ours = stiffness_lb_in(float(gauge))
+        hertz = math.sqrt(ours * POUND_FORCE / INCH / (load * POUND_MASS)) / (2.0 * math.pi)
+        rows.append(
+            [f"{gauge:g}", f"{load:.0f} | {row[0]:g}", f"{ours:.0f} | {row[1]:g}", f"{hertz:.2f} | {row[-1]:g}"]
+        )
+    note = (
+        "the plant's surface is the thesis's measured one (bellows free to balloon, Table 5.2, continued); the "
+        "catalogue's is "
+        "for bellows that roll over the plate: it carries more and is softer for its load"
+    )
+    header = ["pressure, psig", "load, lb", "spring rate, lb/in", "natural frequency, Hz"]
+    return Table("Table 4.2: at 1.8 in, here | printed", header, rows, note)
 
 
 def _kept_table(kept: dict[str, tuple[float, float]]) -> Table:
@@ -55,13 +110,11 @@ def _laws_claim() -> Claim:
     printed = {"pressure": s.mass / s.length, "stiffness": s.mass, "damping": s.mass}
     same = all(math.isclose(s.factor(name), value) for name, value in printed.items())
     diameter = math.sqrt(s.orifice_area)
-    return Claim(
+    return verdict(
         "pneumatic-laws",
-        "Eqs. 4.62, 4.79, 4.80",
-        "C_P = C_m/C_L, C_k = C_m, C_d = C_L^(3/2), C_B = C_m",
-        f"{s.mass / s.length:g}, {s.mass:g}, {s.length**1.5:.2f}, {s.mass:g}",
         f"{s.factor('pressure'):g}, {s.factor('stiffness'):g}, {diameter:.2f}, {s.factor('damping'):g}",
         same and math.isclose(diameter, s.length**1.5),
+        printed=f"{s.mass / s.length:g}, {s.mass:g}, {s.length**1.5:.2f}, {s.mass:g}",
     )
 
 
@@ -80,13 +133,13 @@ def _similar_claim(name: str, kept: tuple[float, float]) -> Claim:
 
 def _nature_claim(broken: dict[str, float]) -> Claim:
     gravity, air = broken["gravity not scaled"], broken["atmosphere not scaled"]
-    return Claim(
+    return verdict(
         "laws-sufficient",
-        "4.3, Eqs. 4.62, 4.79",
-        "the five laws suffice for similitude",
-        "sufficient",
         f"differ by {gravity:.0f} std with gravity as it is, {air:.1f} std with the atmosphere as it is",
         False,
-        "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = 5 and "
-        "the atmosphere with C_P = 2.4 (errata 18)",
+        (
+            "Eq. 4.37 hides g in the acceleration and P2*A hides the atmosphere: g would have to scale with C_L/C_T2 = "
+            "5 and "
+            "the atmosphere with C_P = 2.4 (errata 18)"
+        ),
     )

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
+import yaml
 from matplotlib.figure import Figure as Canvas
+
+from pneumo_ros.paths import share_file
 
 Step = Callable[[str], None]  # called with the name of each experiment as it begins
 
@@ -31,6 +35,20 @@ class Claim:
     ours: str
     holds: bool
     why: str = ""
+
+
+@lru_cache(maxsize=1)
+def printed_claims() -> dict[str, dict[str, str]]:
+    """The thesis's claims by key: where, says and, unless it is computed from a table, printed."""
+    text = share_file("config", "thesis_claims.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text)["claims"])
+
+
+def verdict(key: str, ours: str, holds: bool, why: str = "", *, printed: str | None = None) -> Claim:
+    """The claim of a key of config/thesis_claims.yaml with our figure; ``printed`` where the file leaves it out."""
+    said = printed_claims()[key]
+    figure = printed if printed is not None else said["printed"]
+    return Claim(key, said["where"], said["says"], figure, ours, bool(holds), why)
 
 
 @dataclass(frozen=True)

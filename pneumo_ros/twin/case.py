@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.twin.catalogue import Applied, get
 from pneumo_ros.twin.draw import drawn_rig, real_twin, scenes
-from pneumo_ros.twin.gauge import NUISANCE, refit
+from pneumo_ros.twin.gauge import NUISANCE, Null, null_of, quick_gap, refit
 from pneumo_ros.twin.log import write_log
 from pneumo_ros.twin.parameters import TwinRig
 from pneumo_ros.twin.plan import Planned
@@ -27,7 +28,8 @@ Logs = NDArray[np.float64]
 LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
 GRADE_TOLERANCE = 0.04  # relative
-LARGEST_TRIES = 9
+QUICK_TRIES, CAREFUL_TRIES = 5, 9
+RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ def bench() -> Bench:
     """The nominal rig that ships with the package."""
     nominal = load_rig()
     car, trim = nominal_half_car(nominal)
-    return Bench(nominal, car, trim.pressures)
+    return Bench(nominal, replace(car, step=RULER_STEP), trim.pressures)
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
     twin = real_twin(drawn, on.nominal, on.references, rng)
     fit, held, edit = (_rideable(scene, twin, on) for scene in scenes(rng, case.imperfect))
     effect_seed = int(rng.integers(1, 2**31))
-    null = _refitted(play(twin, on.nominal, fit, on.car.surface), on)
+    null = null_of(on.car, observation(play(twin, on.nominal, fit, on.car.surface), on.nominal))
     graded = _graded(case, twin, fit, null, effect_seed, on)
     rig, road_gain = _combined(twin, graded.applied)
     held, shown, held_floor = _telling(held, twin, rig, road_gain, 0.5 * case.grade, on)
@@ -98,7 +100,7 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
         "truth": _truth(case, graded),
         "grade": case.grade,
         "ratio": {"fit": graded.ratio, "holdout": shown / held_floor},
-        "gap": {"fit": graded.gap, "holdout": shown, "floor_fit": null[0], "floor_holdout": held_floor},
+        "gap": {"fit": graded.gap, "holdout": shown, "floor_fit": null.gap, "floor_holdout": held_floor},
         "withheld": list(case.withhold),
         "seed": case.seed,
         "tolerances_sigma": sigmas,
@@ -168,7 +170,7 @@ def _combined(twin: TwinRig, applied: tuple[Applied, ...]) -> tuple[TwinRig, flo
     return applied[-1].rig, max(item.road_gain for item in applied)
 
 
-def _graded(case: Planned, twin: TwinRig, scene: Scene, null: tuple[float, Logs], seed: int, on: Bench) -> Graded:
+def _graded(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
     """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
     sizes = []
     for i in range(len(case.effects)):
@@ -176,33 +178,51 @@ def _graded(case: Planned, twin: TwinRig, scene: Scene, null: tuple[float, Logs]
         sizes.append(case.size or _search(alone, twin, scene, null, seed, on))
     applied = _applied(case, twin, tuple(sizes), seed)
     rig, road_gain = _combined(twin, applied)
-    value = null[0]
+    value = null.gap
     if applied:
-        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null[1])[0]
-    return Graded(max(sizes, default=0.0), value, value / null[0], applied)
+        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
+    return Graded(max(sizes, default=0.0), value, value / null.gap, applied)
 
 
-def _search(case: Planned, twin: TwinRig, scene: Scene, null: tuple[float, Logs], seed: int, on: Bench) -> float:
-    """Size whose refit gap is ``case.grade`` floors: false position on log(excess) over log(size)."""
-    wanted = 0.5 * math.log(case.grade**2 - 1.0)
-    low: tuple[float, float] | None = None
-    high: tuple[float, float] | None = None
-    size = min(0.02 * case.grade, 0.5)
-    for _ in range(LARGEST_TRIES):
+def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> float:
+    """Size whose refit gap is ``case.grade`` floors: the quick ruler finds the neighbourhood, the refit decides."""
+
+    def ratio_at(size: float, careful: bool) -> float:
         rig, road_gain = _combined(twin, _applied(case, twin, (size,), seed))
         session = play(rig, on.nominal, scene, on.car.surface, road_gain)
-        ratio = _refitted(session, on, null[1])[0] / null[0]
-        if abs(ratio / case.grade - 1.0) < GRADE_TOLERANCE:
-            return size
-        excess = 0.5 * math.log(max(ratio**2 - 1.0, 1e-3)) if math.isfinite(ratio) else 10.0
+        return _left(session, null, on, careful) / null.gap
+
+    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)[0]
+
+
+def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
+    """(size, how far off its ratio is): false position on log(excess over the floor) against log(size)."""
+    wanted = 0.5 * math.log(grade**2 - 1.0)
+    low: tuple[float, float] | None = None
+    high: tuple[float, float] | None = None
+    size, best, closest = start, start, math.inf
+    for _ in range(tries):
+        ratio = ratio_at(size)
+        off = abs(ratio / grade - 1.0)
+        if off < closest:
+            best, closest = size, off
+        if off < GRADE_TOLERANCE or (size >= 1.0 and ratio < grade):
+            break
+        excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
         if excess < wanted:
             low = (math.log(size), excess)
-            if size >= 1.0:
-                return 1.0
         else:
             high = (math.log(size), excess)
         size = _next_size(low, high, wanted)
-    return size
+    return best, closest
+
+
+def _left(session: Session, null: Null, on: Bench, careful: bool) -> float:
+    if careful:
+        return _refitted(session, on, null.logs)[0]
+    seen = observation(session, on.nominal)
+    return quick_gap(on.car, seen, null) if np.isfinite(seen.measured).all() else math.inf
 
 
 def _next_size(low: tuple[float, float] | None, high: tuple[float, float] | None, wanted: float) -> float:

@@ -23,7 +23,7 @@ def write_log(path: Path, session: Session, config: Rig, start_ns: int) -> None:
     topics = {t.name: writer.add_topic(t.name, t.type)
               for t in (ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, CONFIG)}  # fmt: skip
     for name, stamp, data in messages:
-        writer.write(topics[name], data, stamp, stamp)
+        writer.write(topics[name], data, stamp)
     writer.finish()
     beside = path.with_name("metadata.yaml")
     beside.unlink(missing_ok=True)  # a case holds several logs, none of which is the folder's bag

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,7 @@ def play(rig: TwinRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_ga
     nominal : the rig file the log carries: outlets and noise
     road_gain : extra factor that an effect needs
     """
-    time: NDArray[np.float64] = PERIOD * np.arange(SAMPLES, dtype=np.float64)
+    time = _time()
     changed = rig._replace(
         frame=rig.frame._replace(
             sprung_mass=rig.frame.sprung_mass + scene.added_mass,
@@ -99,7 +100,7 @@ def play(rig: TwinRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_ga
     )
     outlets = (nominal.outlet_area_front.value, nominal.outlet_area_rear.value)
     rest = rest_of(changed, outlets, surface)
-    ground = road(scene.road, time, nominal.wheelbase, scene.gain * road_gain, scene.seed)
+    ground = scene.gain * road_gain * _unit_road(scene.road, nominal.wheelbase, scene.seed)
     excite = valve_steps if scene.valves == "steps" else valve_waves
     gains = ACTIVE if scene.controller == "active" else LEVELLING
     sigma = np.array([nominal.displacement_noise.value] * 4 + [nominal.pressure_noise.value] * 2)
@@ -107,6 +108,16 @@ def play(rig: TwinRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_ga
     shake = excite(time, scene.valve_size, scene.seed + 1)
     done = simulate(prepared(changed, rest), rest, ground, shake, noise, surface, gains, PERIOD)
     return _sampled(time, done, noise, ground, outlets, scene)
+
+
+def _time() -> NDArray[np.float64]:
+    return PERIOD * np.arange(SAMPLES, dtype=np.float64)
+
+
+@lru_cache(maxsize=8)
+def _unit_road(kind: str, wheelbase: float, seed: int) -> NDArray[np.float64]:
+    """The same road is run at many sizes of an effect."""
+    return road(kind, _time(), wheelbase, 1.0, seed)
 
 
 def observation(session: Session, nominal: Rig) -> Observation:

@@ -39,7 +39,7 @@ class Findings:
     phrases : effect id -> what it is, in words
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
-    law : what is missing at the first place, as a curve
+    laws : what is missing at the places, as curves
     """
 
     summary: Mapping[str, Any]
@@ -49,7 +49,7 @@ class Findings:
     phrases: Mapping[str, str] = field(default_factory=dict)
     regimes: Sequence[str] = ()
     conditional: Mapping[str, float] = field(default_factory=dict)
-    law: Law | None = None
+    laws: Sequence[Law] = ()
 
 
 def contents(found: Findings) -> dict[str, Any]:
@@ -70,12 +70,13 @@ def contents(found: Findings) -> dict[str, Any]:
             for place, share in shares.items()
             if share >= 0.01
         ],
-        "law": None if found.law is None else _law(found.law),
+        "laws": [_law(law) for law in found.laws],
         "ladder": ladder(_rungs(summary["gap"])),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
         "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10]],
         "parameters": _parameters(summary),
+        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items()],
         "ambiguity": _ambiguity(summary, found.phrases),
         "experiment": summary.get("next_experiment"),
         "edit": _edit(summary),
@@ -105,14 +106,14 @@ def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
     entry = _winner(summary)
     sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
     parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
-    return _sentence(" and ".join(parts))
+    return _sentence("; and ".join(parts))
 
 
 def confidence(summary: Mapping[str, Any]) -> str:
     """How sure, in words and in per cent."""
     p = float(summary["probability"])
     word = "sure" if p >= SURE else "likely" if p >= LIKELY else "not sure"
-    return f"{word}: {100 * p:.0f} %"
+    return f"{word}: {'above 99' if p > 0.99 else format(100 * p, '.0f')} %"
 
 
 def how_far(summary: Mapping[str, Any]) -> str:
@@ -153,10 +154,11 @@ def _winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _effect_words(effect: str, side: str | None, phrases: Mapping[str, str]) -> str:
-    where = {"both": " at both ends", "front": " at the front", "rear": " at the rear"}.get(side or "", "")
-    if side and not where:
-        where = f" ({side.replace('_', ' ')})"
-    return f"{phrases.get(effect, effect.replace('_', ' '))}{where}"
+    what = phrases.get(effect, effect.replace("_", " "))
+    where = {"both": "at both ends", "front": "at the front", "rear": "at the rear"}.get(side or "")
+    if where is None:
+        return f"{what} ({side.replace('_', ' ')})" if side else what
+    return f"{where}, {what}"
 
 
 def _sentence(text: str) -> str:
@@ -171,9 +173,9 @@ def _percent(share: float) -> str:
 
 
 def _tone(summary: Mapping[str, Any]) -> str:
-    if summary["verdict"] == "none":
-        return "fine"
-    return "open" if summary["verdict"] in ("unknown", "not_testable") or summary["probability"] < LIKELY else "found"
+    if summary["verdict"] in ("unknown", "not_testable") or float(summary["probability"]) < LIKELY:
+        return "open"
+    return "fine" if summary["verdict"] == "none" else "found"
 
 
 def _rungs(gap: Mapping[str, Any]) -> list[tuple[str, float, str]]:
@@ -259,13 +261,14 @@ def _law(law: Law) -> dict[str, str]:
 def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     if not summary.get("ranking"):
         return []
-    out = []
-    for name, quantity in _winner(summary)["parameters"].items():
-        value, std = float(quantity["value"]), float(quantity.get("std") or 0.0)
-        unit, factor = readable(str(quantity.get("unit") or "1"), np.array([value]))
-        shown = "" if unit == "1" else unit
-        out.append({"name": name.replace("_", " "), "value": rounded(value * factor, std * factor), "unit": shown})
-    return out
+    return [_quantity(name, value) for name, value in _winner(summary)["parameters"].items()]
+
+
+def _quantity(name: str, quantity: Mapping[str, Any]) -> dict[str, str]:
+    value, std = float(quantity["value"]), float(quantity.get("std") or 0.0)
+    unit, factor = readable(str(quantity.get("unit") or "1"), np.array([value]))
+    shown = "" if unit == "1" else unit
+    return {"name": name.replace("_", " "), "value": rounded(value * factor, std * factor), "unit": shown}
 
 
 _READABLE = {

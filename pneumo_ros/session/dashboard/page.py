@@ -112,7 +112,7 @@ class Page:
         assert isinstance(source, Playback)
         length = max((source.end_ns - source.start_ns) * 1e-9, 1e-3)
         self._play = play = Toggle(label="Play / pause", active=True, button_type="success", name="play", width=110)
-        play.on_change("active", lambda _, __, new: setattr(source, "playing", new))
+        play.on_change("active", lambda _, __, new: source.play(new))
         loop = Toggle(label="Loop", active=False, name="loop", width=70)
         loop.on_change("active", lambda _, __, new: setattr(source, "loop", new))
         speed = Select(title="", value="1", options=[(s, f"{s} x") for s in SPEEDS], width=80, name="speed")
@@ -219,7 +219,7 @@ class Page:
         self._event_count = len(events)
         newest = list(events)[: -EVENTS_SHOWN - 1 : -1]
         self._events.data = {
-            "time": [f"{(e.time_ns - start_ns) * 1e-9:.3f}" for e in newest],
+            "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" for e in newest],
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
             "source": [e.source for e in newest],
             "code": [e.code for e in newest],

@@ -107,6 +107,12 @@ class Playback:
         """The log's rig, or the nominal one."""
         return self._rig
 
+    def play(self, on: bool) -> None:
+        """Go on, from the start if the end is reached; or stand still."""
+        if on and not self.playing and self._now >= self.end_ns:
+            self._now = self.start_ns
+        self.playing = on
+
     def seek(self, seconds: float) -> None:
         """Show the instant ``seconds`` after the start."""
         self._now = min(max(self.start_ns + round(seconds * 1e9), self.start_ns), self.end_ns)

@@ -27,7 +27,7 @@ def at_random(name: str, found: Found) -> Found:
     ids = ("none", "unknown", *known_effects())
     verdict = str(rng.choice(ids))
     entry = {"effects": [verdict], "side": str(rng.choice(["front", "rear", "both"])), "parameters": {}}
-    return Found(verdict, 1.0 / len(ids), (str(rng.choice(PLACES)),), (entry,), gap=found.gap)
+    return Found(verdict, 1.0 / len(ids), (str(rng.choice(PLACES)),), (entry,))
 
 
 def refit_only(name: str, found: Found) -> Found:
@@ -42,7 +42,8 @@ def best_training_fit(name: str, found: Found) -> Found:
     if not single:
         return Found("none", 1.0, gap=found.gap)
     best = min(single, key=lambda e: float(e.get("gap_fit", e.get("gap_after", np.inf))))
-    return Found(str(best["effects"][0]), 1.0, found.places, (best,), gap=found.gap)
+    gap = {**found.gap, "best": best.get("gap_after", _number(found.gap, "refit"))}
+    return Found(str(best["effects"][0]), 1.0, found.places, (best,), gap=gap)
 
 
 BASELINES: dict[str, Callable[[str, Found], Found]] = {

@@ -65,24 +65,48 @@ LINES: tuple[Line, ...] = (
 )
 
 
+HEAD = """# The blind check: results
+
+Cases are made by a richer rig (`twin/`), written apart from the library of the diagnosis: neither imports the other.
+Every label is sealed by a salted SHA-256 in the set's manifest before the diagnosis runs; seals are checked when the
+answers are opened. How:
+
+    pneumo blind make DIR --set full
+    pneumo blind diagnose DIR
+    pneumo blind score DIR --output docs/blind-results.md
+
+`gap/floor` is what the nominal model leaves after a refit inside its tolerances, over what it leaves on the same log
+without the effect. In brackets: hits, count and the Wilson 95 % interval. The four last columns are baselines scored by
+the same code. The full set is opened once per release; results of earlier releases stay below.
+"""
+MARK = "<!-- newest first -->"
+
+
 def write_report(
     page: Path, labels: Mapping[str, Label], found: Mapping[str, Found], manifest: Mapping[str, Any]
 ) -> str:
-    """Write ``page`` (Markdown) and ``page`` with .png; returns a short summary for the terminal."""
+    """Put a section on ``page`` (Markdown) above earlier ones, and its plot beside it; returns the table of scores."""
     cases = cases_of(labels, found)
     rivals = {name: cases_of(labels, verdicts) for name, verdicts in applied(found).items()}
-    table = _table(cases, rivals)
+    table, commit = _table(cases, rivals), _commit()
+    plot = page.with_name(f"{page.stem}-{manifest['set']}-{commit}.png")
     parts = [
-        f"Set `{manifest['set']}` (seed {manifest['seed']}), {len(cases)} of {len(labels)} cases diagnosed, "
-        f"{manifest['software']}, commit {_commit()}. All {len(labels)} seals verified.",
+        f"## Set `{manifest['set']}` at {commit}",
+        f"Seed {manifest['seed']}; {len(cases)} of {len(labels)} cases diagnosed; {manifest['software']}; all "
+        f"{len(labels)} seals verified.",
         table,
         _detection(cases, rivals),
+        f"![reliability and risk]({plot.name})",
         _confusion(cases),
         _failures(cases),
+        _short_of_grade(cases),
     ]
     page.parent.mkdir(parents=True, exist_ok=True)
-    page.write_text("\n\n".join(parts) + f"\n\n![reliability and risk]({page.with_suffix('.png').name})\n", "utf-8")
-    _plot(page.with_suffix(".png"), cases)
+    earlier = page.read_text("utf-8").partition(MARK)[2].strip() if page.exists() else ""
+    part = page.with_name(page.name + ".part")
+    part.write_text("\n\n".join([HEAD.strip(), MARK, *parts, *filter(None, [earlier])]) + "\n", "utf-8")
+    _plot(plot, cases)
+    part.rename(page)
     return table
 
 
@@ -126,6 +150,17 @@ def _failures(cases: Sequence[Case]) -> str:
         ])  # fmt: skip
     head = ["case", "kind", "truth", "gap/floor", "verdict", "group", "ranking"]
     return f"### Every failure ({len(rows)})\n\n" + (_markdown(head, rows) if rows else "None.")
+
+
+def _short_of_grade(cases: Sequence[Case]) -> str:
+    """Effects whose largest sane size leaves a smaller gap than was wanted: said, not stretched."""
+    rows = [
+        [str(c.label["case"]), _truth_text(c.label), f"{c.label['grade']:g}", f"{c.label['ratio']['fit']:.2f}"]
+        for c in cases
+        if c.kind != "pair" and c.label["grade"] and c.label["ratio"]["fit"] < 0.9 * c.label["grade"]
+    ]
+    head = ["case", "effect", "wanted gap/floor", "reached at the largest sane size"]
+    return f"### Short of their grade ({len(rows)})\n\n" + (_markdown(head, rows) if rows else "None.")
 
 
 def _truth_text(label: Label) -> str:

@@ -73,7 +73,7 @@ def parse(diagnosis: Mapping[str, Any], seconds: float = math.nan) -> Found:
         ranking=tuple(diagnosis.get("ranking", [])),
         group=tuple(map(str, diagnosis.get("ambiguity_group", []))),
         gap=diagnosis.get("gap", {}),
-        edit=diagnosis.get("edit") or {},
+        edit={key.removeprefix("gap_"): value for key, value in (diagnosis.get("edit_test") or {}).items()},
         seconds=seconds,
     )
 

@@ -13,7 +13,7 @@ DAMPING = 100.0  # N s/m
 SPEEDS = (0.005, 0.02, 0.06, 0.2)  # m/s at which friction saturates
 SLACKS = (5e-5, 3e-4, 1.5e-3)  # m of creep before slip
 MEMORIES = (0.02, 0.1, 0.5)  # s
-MODES = (40.0, 75.0, 160.0)  # rad/s of a bellows mode
+MODES = (40.0, 60.0, 80.0, 100.0, 130.0, 170.0)  # rad/s of a bellows mode: between the body's and what a window passes
 
 
 def force_bases(features: Features, i: int) -> list[Basis]:

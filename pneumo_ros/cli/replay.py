@@ -1,0 +1,221 @@
+"""``pneumo replay``: a log again - live into ROS, stepped through today's code, or its road through the rig."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from pneumo_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from pneumo_ros.session.reading import Log
+    from pneumo_ros.session.replay import Replayed
+    from pneumo_ros.session.rerun import Rerun
+    from pneumo_ros.session.what_if import Row
+
+app = typer.Typer(add_completion=False)
+console = Console()
+DIFFERS = 1
+
+
+@app.command()
+def replay(
+    log: Annotated[
+        Path, typer.Argument(help="Session log (.mcap) or bag folder; a damaged one as far as it is whole.")
+    ],
+    stepped: Annotated[
+        bool, typer.Option("--stepped", help="Through today's estimator and controller, compared sample by sample.")
+    ] = False,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="node.parameter=value, repeatable: what would have been commanded?"),
+    ] = None,
+    closed_loop: Annotated[
+        bool, typer.Option("--closed-loop", help="The recorded road through the rig's model, which then reacts.")
+    ] = False,
+    diagnosis: Annotated[
+        Path | None, typer.Option(help="diagnosis.json: --closed-loop runs the rig as it was diagnosed.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the log with the replayed topics in place (.mcap).")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write the overlay plot here (.png).")] = None,
+    rate: Annotated[float, typer.Option(help="Live: speed, 1 is real time.", min=0.01, max=100.0)] = 1.0,
+    start: Annotated[float, typer.Option(help="Live: begin this many seconds into the log.", min=0.0)] = 0.0,
+    paused: Annotated[bool, typer.Option("--paused", help="Live: wait for space, or parameter paused=false.")] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="Live: begin again at the end.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Live: republish recorded outputs too, not only what the nodes take in.")
+    ] = False,
+    domain_id: Annotated[int | None, typer.Option(help="Live: DDS domain.", min=0, max=232)] = None,
+) -> None:
+    """Replay a log. Live by default: its inputs are published again, with /clock, for nodes that run beside it."""
+    from pneumo_ros.session.salvage import read_or_salvage
+
+    found, remark = read_or_salvage(log)
+    if remark:
+        console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
+    if closed_loop or diagnosis is not None:
+        _closed_loop(found, parse_overrides(set_), diagnosis, plot)
+    elif stepped or set_:
+        _stepped(found, parse_overrides(set_), output, plot)
+    else:
+        from pneumo_ros.cli.replay_live import play
+
+        play(found, rate, start, paused, loop, everything, domain_id)
+
+
+def parse_overrides(texts: list[str] | None) -> dict[str, dict[str, Any]]:
+    """``controller.pole=20`` ... -> node -> parameter -> value.
+
+    Raises
+    ------
+    InputError
+        if a text is of another form or names a node that replay does not run.
+    """
+    from pneumo_ros.session.plan import parse_setting
+    from pneumo_ros.session.replay import TABLES
+
+    out: dict[str, dict[str, Any]] = {}
+    for text in texts or []:
+        node, name, value = parse_setting(text)
+        if node not in TABLES:
+            raise InputError("not a node that replay runs", where="--set", key=node, allowed=", ".join(TABLES))
+        out.setdefault(node, {})[name] = value
+    return out
+
+
+def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path | None, plot: Path | None) -> None:
+    from pneumo_ros.session.replay import replay as step
+    from pneumo_ros.session.replay import replayed_log, warm_up
+    from pneumo_ros.session.rewriting import refuse_target, write_log
+
+    if output is not None:
+        refuse_target(output, log.path)
+    warm_up(log)
+    begin = time.perf_counter()
+    result = step(log, overrides)
+    took = time.perf_counter() - begin
+    _show_run(result, took)
+    if overrides:
+        _show_what_if(log, result, plot)
+    else:
+        console.print(agreement_table(result))
+        if plot is not None:
+            _draw(result, plot, f"{log.path.name}, replayed")
+    if output is not None:
+        write_log(replayed_log(log, result), output, {"replay": {"source": log.path.name, "set": str(dict(overrides))}})
+        console.print(f"log      {output}", highlight=False, soft_wrap=True)
+    if not overrides and any(not a.identical for a in result.agreements):
+        raise typer.Exit(DIFFERS)
+
+
+def _show_run(result: Replayed, took: float) -> None:
+    span = (result.estimate.stamp_ns[-1] - result.estimate.stamp_ns[0]) * 1e-9 if len(result.estimate.stamp_ns) else 0.0
+    speed = f"{span / took:.0f} times real time" if took > 0.0 else ""
+    console.print(f"{len(result.estimate.stamp_ns)} samples, {span:.3f} s, in {took:.2f} s ({speed})", highlight=False)
+    if result.skipped:
+        console.print(
+            f"{result.skipped} of {result.samples} samples were never taken by the running estimator; left out"
+        )
+    for note in result.notes:
+        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+
+
+def agreement_table(result: Replayed) -> Table:
+    """Each replayed topic beside its recording."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("topic", no_wrap=True)
+    for title in ("samples", "equal bytes", "first difference s", "largest difference"):
+        table.add_column(title, justify="right")
+    start = int(result.estimate.stamp_ns[0]) if len(result.estimate.stamp_ns) else 0
+    for a in result.agreements:
+        worst = max(range(len(a.names)), key=lambda k: a.largest[k], default=0)
+        largest = "0" if a.identical or not a.largest else f"{a.largest[worst]:.3g} ({a.names[worst]})"
+        first = "" if a.first_difference_ns is None else f"{(a.first_difference_ns - start) * 1e-9:.3f}"
+        table.add_row(a.topic, str(a.compared), "all" if a.identical else str(a.equal), first, largest)
+    return table
+
+
+def _show_what_if(log: Log, result: Replayed, plot: Path | None) -> None:
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.session.what_if import CAVEAT, what_if
+
+    changed = ", ".join(
+        f"{node}.{name} = {value}" for node, own in result.overridden.items() for name, value in own.items()
+    )
+    console.print(f"what if {changed}", highlight=False, soft_wrap=True)
+    console.print(what_if_table(what_if(result, log.config or load_rig())))
+    console.print(CAVEAT, highlight=False, soft_wrap=True)
+    _draw(result, plot or log.path.with_name(f"{log.path.stem}-what-if.png"), f"{log.path.name}: {changed}")
+
+
+def what_if_table(rows: list[Row]) -> Table:
+    """Recorded and replayed figures."""
+    table = Table("figure", "unit", "recorded", "replayed", "change", box=box.SIMPLE_HEAD)
+    for row in rows:
+        change = f"{100.0 * (row.replayed / row.recorded - 1.0):+.1f} %" if row.recorded else ""
+        table.add_row(row.name, row.unit, f"{row.recorded:.4g}", f"{row.replayed:.4g}", change)
+    return table
+
+
+def _draw(result: Replayed, path: Path, title: str) -> None:
+    from pneumo_ros.session.what_if import draw_overlay
+
+    draw_overlay(result, path, title)
+    console.print(f"picture  {path}", highlight=False, soft_wrap=True)
+
+
+def _closed_loop(
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, plot: Path | None
+) -> None:
+    from pneumo_ros.session.rerun import draw_rerun
+    from pneumo_ros.session.rerun import rerun as run_again
+
+    result = run_again(log, overrides) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
+    for note in result.notes:
+        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+    console.print(rerun_table(result))
+    if plot is not None:
+        draw_rerun(result, plot, f"{log.path.name}: its road through the rig's model in closed loop")
+        console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
+
+
+def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path) -> Rerun:
+    from pneumo_ros.gap.closed_loop import rerun_diagnosed
+    from pneumo_ros.gap.signals import read_signals
+    from pneumo_ros.session.inspection import read_setups, seed_of
+    from pneumo_ros.session.replay import plan
+
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read the diagnosis ({error})", where=path, remedy="give diagnosis.json") from error
+    setups, notes = list(read_setups(log)), list[str]()
+    values = [plan(setups, node, overrides.get(node, {}), notes).start for node in ("estimator", "controller")]
+    seed = int(seed_of(log).get("plant", 0))
+    result = rerun_diagnosed(read_signals(log.path), document, values[0], values[1], seed)
+    return replace(result, notes=(*result.notes, *notes))
+
+
+def rerun_table(result: Rerun) -> Table:
+    """Each measured channel: as recorded, as the model in closed loop gives it."""
+    from pneumo_ros.session.rerun import compare_channels
+
+    table = Table("channel", "unit", "std, recorded", "std, closed loop", "rms difference / std", box=box.SIMPLE_HEAD)
+    for name, unit, recorded, ours, gap in compare_channels(result):
+        table.add_row(name, unit, f"{recorded:.4g}", f"{ours:.4g}", f"{gap:.3f}")
+    return table
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,150 @@
+"""Layouts of the dashboard's panels for Foxglove and PlotJuggler, made from the same table.
+
+Both plot what is recorded, so signals that the dashboard derives (tyre forces, heave from the LVDTs) are replaced by
+the recorded ones; both show SI units. Foxglove addresses a JointState's values by their place in the message (the order
+of the table of topics, which the recorder keeps), PlotJuggler by name.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+from xml.etree import ElementTree
+
+from pneumo_ros.session import topics
+from pneumo_ros.session.dashboard.panels import FRONT, PANELS, REAR, Line, Panel
+
+TAB = "half-car rig"
+_RAW = (
+    Panel("tyre force (N), simulation only", (
+        Line("front", topics.TRUTH.name, "front_tyre_force", 1.0, FRONT),
+        Line("rear", topics.TRUTH.name, "rear_tyre_force", 1.0, REAR),
+    )),
+    Panel("displacement (m)", tuple(
+        Line(name, topics.DISPLACEMENT.name, name, 1.0, colour, dash)
+        for name, colour, dash in zip(
+            topics.DISPLACEMENT.names, (FRONT, REAR, FRONT, REAR), ("solid", "solid", "dashed", "dashed"), strict=True
+        )
+    )),
+    Panel("road (m)", tuple(
+        Line(name, topics.ROAD.name, name, 1.0, colour) for name, colour in zip(("front", "rear"), (FRONT, REAR),
+                                                                               strict=True)
+    )),
+)  # fmt: skip
+
+
+def recorded_panels() -> tuple[Panel, ...]:
+    """Panels whose every line is recorded, titles in SI."""
+    kept = []
+    for panel in PANELS:
+        lines = tuple(line for line in panel.lines if line.source in topics.BY_NAME)
+        if lines:
+            kept.append(Panel(f"{panel.title.split(' (')[0]} ({unit(lines[0])})", lines))
+    return (*kept, *_RAW)
+
+
+def unit(line: Line) -> str:
+    """SI unit of a line's channel."""
+    return dict(topics.BY_NAME[line.source].fields)[line.channel]
+
+
+def foxglove_layout() -> str:
+    """A layout file, as Foxglove's "Import from file" takes it."""
+    panels = recorded_panels()
+    plots = {f"Plot!pneumo{i}": _foxglove_plot(panel) for i, panel in enumerate(panels)}
+    names = list(plots)
+    half = (len(names) + 1) // 2
+    columns = {
+        "first": _stacked(names[:half]), "second": _stacked(names[half:]), "direction": "row", "splitPercentage": 50,
+    }  # fmt: skip
+    document = {
+        "configById": plots,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": columns,
+    }
+    return json.dumps(document, indent=2) + "\n"
+
+
+def _foxglove_plot(panel: Panel) -> dict[str, Any]:
+    paths = [
+        {
+            "value": foxglove_path(line),
+            "label": line.label,
+            "color": line.colour,
+            "enabled": True,
+            "timestampMethod": "headerStamp",
+        }
+        for line in panel.lines
+    ]
+    return {
+        "title": panel.title,
+        "paths": paths,
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "showLegend": True,
+        "legendDisplay": "floating",
+        "showPlotValuesInLegend": False,
+        "isSynced": True,
+        "xAxisVal": "timestamp",
+        "sidebarDimension": 240,
+        "foxglovePanelTitle": panel.title,
+    }
+
+
+def foxglove_path(line: Line) -> str:
+    """Message path of a line: ``/valve/command.position[0]``."""
+    topic = topics.BY_NAME[line.source]
+    if topic.type != topics.JOINT:
+        return f"{topic.name}.{line.channel}"
+    return f"{topic.name}.position[{topic.names.index(line.channel)}]"
+
+
+def _stacked(names: list[str]) -> Any:
+    """A column of panels of equal height."""
+    if len(names) == 1:
+        return names[0]
+    share = round(100.0 / len(names), 2)
+    return {"first": names[0], "second": _stacked(names[1:]), "direction": "column", "splitPercentage": share}
+
+
+def plotjuggler_layout() -> str:
+    """A layout file for PlotJuggler 3."""
+    root = ElementTree.Element("root")
+    tabs = ElementTree.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
+    tab = ElementTree.SubElement(tabs, "Tab", tab_name=TAB, containers="1")
+    panels = recorded_panels()
+    half = (len(panels) + 1) // 2
+    both = _splitter(ElementTree.SubElement(tab, "Container"), "|", 2)
+    for column in (panels[:half], panels[half:]):
+        splitter = _splitter(both, "-", len(column))
+        for panel in column:
+            _plotjuggler_plot(splitter, panel)
+    ElementTree.SubElement(tabs, "currentTabIndex", index="0")
+    ElementTree.indent(root, " ")
+    return "<?xml version='1.0' encoding='UTF-8'?>\n" + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _splitter(parent: ElementTree.Element, orientation: str, count: int) -> ElementTree.Element:
+    sizes = ";".join([f"{1.0 / count:.6f}"] * count)
+    return ElementTree.SubElement(parent, "DockSplitter", orientation=orientation, count=str(count), sizes=sizes)
+
+
+def _plotjuggler_plot(parent: ElementTree.Element, panel: Panel) -> None:
+    area = ElementTree.SubElement(parent, "DockArea", name=panel.title)
+    plot = ElementTree.SubElement(area, "plot", mode="TimeSeries", style="Lines", flip_x="false", flip_y="false")
+    ElementTree.SubElement(plot, "range", left="0.0", right="20.0", bottom="-1.0", top="1.0")
+    ElementTree.SubElement(plot, "limitY")
+    for line in panel.lines:
+        ElementTree.SubElement(plot, "curve", name=plotjuggler_curve(line), color=line.colour)
+
+
+def plotjuggler_curve(line: Line) -> str:
+    """Curve name of a line: ``/valve/command/front_inlet/position``."""
+    suffix = "/position" if topics.BY_NAME[line.source].type == topics.JOINT else ""
+    return f"{line.source}/{line.channel}{suffix}"
+
+
+LAYOUTS = {"foxglove.json": foxglove_layout, "plotjuggler.xml": plotjuggler_layout}
+"""File name below config/layouts/ -> what makes it."""

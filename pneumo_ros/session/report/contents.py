@@ -1,0 +1,168 @@
+"""What the session's page says, as plain rows; the template only lays it out."""
+
+from __future__ import annotations
+
+import base64
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from pneumo_ros.session.conformance import Finding, check_conformance
+from pneumo_ros.session.inspection import Event, Report, Setup, TopicReport, inspect_log
+from pneumo_ros.session.passive import passive_twin
+from pneumo_ros.session.picture import draw_session
+from pneumo_ros.session.reading import Log
+from pneumo_ros.session.summary import (
+    Recorded,
+    Summary,
+    load_session,
+    loop_timing,
+    ride_rows,
+    summarise,
+    wall_time,
+)
+from pneumo_ros.units import SQUARE_INCH
+
+LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
+_LONG = 2000  # characters of a value shown; whole files belong into the log, not on a page
+_HIDDEN = ("rosbag2",)  # metadata for other programs
+
+Row = tuple[str, ...]
+
+
+def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
+    """Variables of the template.
+
+    Parameters
+    ----------
+    log : the session's log
+    passive : the same road with valves at trim, if the caller has simulated it already
+    """
+    report = inspect_log(log)
+    session = load_session(log.path)
+    if passive is None and len(session.truth) > 1 and len(session.road) > 1:
+        passive = passive_twin(session)
+    ours = summarise(session, loop_timing(log.path), wall_time(log.path))
+    theirs = summarise(passive) if passive is not None else None
+    findings = check_conformance(log)
+    return {
+        "title": log.path.name,
+        "facts": _facts(report),
+        "ending": _ending(report.events),
+        "trips": [_event_row(event, report) for event in report.events if event.level >= 1],
+        "summary": summary_rows(ours, theirs),
+        "has_passive": theirs is not None,
+        "picture": _picture(session, passive, log.path.name),
+        "speed": f"{ours.speed:.1f}" if math.isfinite(ours.speed) else "",
+        "loop": loop_rows(ours),
+        "topics": [topic_row(topic) for topic in report.topics],
+        "events": [_event_row(event, report) for event in report.events],
+        "setups": list(setup_rows(report.setups)),
+        "rig": [(name, f"{nominal:g}", f"{value:g}") for name, (nominal, value) in report.changed_parameters.items()],
+        "rig_name": report.rig or "not in the log",
+        "metadata": [
+            (n, k, _short(v)) for n, entries in report.metadata if n not in _HIDDEN for k, v in entries.items()
+        ],
+        "findings": [(f.level, f.about, f.text) for f in findings],
+        "tone": _tone(findings, report.events),
+    }
+
+
+def summary_rows(ours: Summary, theirs: Summary | None) -> list[Row]:
+    """(figure, unit, session, passive, change) of each figure of `pneumo run`'s table."""
+    rows: list[Row] = []
+    passive = ride_rows(theirs.ride) if theirs is not None and theirs.ride is not None else []
+    for i, (name, unit, values, form) in enumerate(ride_rows(ours.ride) if ours.ride is not None else []):
+        other = passive[i][2] if passive else []
+        rows.append((name, unit, _values(values, form), _values(other, form), _change(values, other)))
+    rows.append(("inlets saturated, f / r", "% of time", _values([100.0 * s for s in ours.saturation], "%.1f"), "", ""))
+    if ours.area_error is not None:
+        error = _values([e / SQUARE_INCH for e in ours.area_error], "%.3f")
+        rows.append(("area estimate, rms error, f / r", "in2", error, "", ""))
+    return rows
+
+
+def _values(values: Sequence[float], form: str) -> str:
+    return " / ".join(form % value for value in values)
+
+
+def _change(ours: Sequence[float], theirs: Sequence[float]) -> str:
+    return " / ".join(f"{100.0 * (a / b - 1.0):+.0f} %" for a, b in zip(ours, theirs, strict=False) if b)
+
+
+def loop_rows(summary: Summary) -> list[Row]:
+    """(node, steps, period p50, p99, max, step p50, p99, max, missed), ms."""
+    rows = []
+    for node, values in summary.loop.items():
+        if values.get("steps", "0") != "0":
+            keys = [f"{label} {p} (us)" for label in ("period", "step") for p in ("p50", "p99", "max")]
+            figures = [f"{float(values.get(key, 'nan')) / 1e3:.3g}" for key in keys]
+            rows.append((node, values["steps"], *figures, values.get("missed periods", "")))
+    return rows
+
+
+def topic_row(topic: TopicReport) -> Row:
+    """(topic, type, messages, length s, rate Hz, jitter ms, missing, delay ms p50 / p99, clock)."""
+    t = topic.timing
+    if t is None:
+        return (topic.name, topic.type, str(topic.count), "", "", "", "", "", "")
+    clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
+    missing = f"{t.missing} in {len(t.gaps)} gaps, longest {t.gaps[0].length:.4g} s" if t.gaps else "0"
+    delay = f"{t.delay_p50 * 1e3:.3g} / {t.delay_p99 * 1e3:.3g}"
+    figures = (f"{topic.duration:.3f}", f"{t.rate_hz:.6g}", f"{t.jitter * 1e3:.3g}", missing, delay)
+    return (topic.name, topic.type, str(topic.count), *figures, ", ".join(clock) or "steady")
+
+
+def setup_rows(setups: Sequence[Setup]) -> Iterator[Row]:
+    """(time s, node, what, parameters): all at the start, later only what changed."""
+    before: dict[str, dict[str, object]] = {}
+    for setup in setups:
+        known = before.setdefault(setup.node, {})
+        new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
+        word = "changed" if known.keys() & new.keys() else "start"
+        known.update(new)
+        shown = ", ".join(f"{key} {_short(str(value))}" for key, value in new.items() if value != "")
+        yield (f"{setup.time_ns / 1e9:.3f}", setup.node, word, shown)
+
+
+def _facts(report: Report) -> list[tuple[str, str]]:
+    known = {key: value for name, entries in report.metadata if name == "pneumo_ros" for key, value in entries.items()}
+    wanted = ("started_utc", "source", "road", "controller", "seed", "mode", "rate_hz")
+    facts = [(key.replace("_", " "), known[key]) for key in wanted if key in known]
+    return [
+        *facts,
+        ("length", f"{report.duration:.3f} s"),
+        ("messages", str(report.count)),
+        ("written by", report.library),
+    ]
+
+
+def _ending(events: Sequence[Event]) -> str:
+    last = [event for event in events if event.code.startswith("session_") and event.code != "session_started"]
+    return f"{last[-1].code}: {last[-1].message}" if last else "the log does not say how the session ended"
+
+
+def _event_row(event: Event, report: Report) -> Row:
+    start = min((t.first_ns for t in report.topics if t.timing is not None), default=0)
+    values = ", ".join(f"{key} {value}" for key, value in event.values.items())
+    level = LEVELS.get(event.level, str(event.level))
+    return (f"{max(event.time_ns - start, 0) * 1e-9:.3f}", level, event.source, event.code, event.message, values)
+
+
+def _tone(findings: Sequence[Finding], events: Sequence[Event]) -> str:
+    if any(f.level == "error" for f in findings) or any(e.level >= 2 for e in events):
+        return "bad"
+    return "doubtful" if any(f.level == "warning" for f in findings) or any(e.level == 1 for e in events) else "fine"
+
+
+def _picture(session: Recorded, passive: Recorded | None, title: str) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "session.png"
+        draw_session(session, path, passive, title)
+        return base64.b64encode(path.read_bytes()).decode()
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONG else f"{text[:_LONG]}... ({len(text)} characters)"

@@ -1,0 +1,131 @@
+"""The recorded road through the rig's model, in closed loop with today's estimator and controller: the plant reacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.control.half_car import build_controller
+from pneumo_ros.control.loop import close_loop
+from pneumo_ros.errors import InputError
+from pneumo_ros.estimation.half_car import build_estimator
+from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.rig import load_rig
+from pneumo_ros.session import topics
+from pneumo_ros.session.inspection import read_setups, seed_of
+from pneumo_ros.session.reading import Log
+from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
+
+CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
+UNITS = ("m", "m", "m", "m", "Pa", "Pa")
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """A closed-loop run on the recorded road.
+
+    Attributes
+    ----------
+    time : (N,) s from the first road sample used
+    channels : (N, 6) measured channels as simulated, :data:`CHANNELS`
+    command : (N, 4) m2
+    recorded_time, recorded : (M,), (M, 6) the log's own, on the same clock
+    notes : what was assumed
+    """
+
+    time: NDArray[np.float64]
+    channels: NDArray[np.float64]
+    command: NDArray[np.float64]
+    recorded_time: NDArray[Any]
+    recorded: NDArray[np.float64]
+    notes: tuple[str, ...]
+
+
+def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
+    """Run the recorded road through the log's rig, from rest.
+
+    Parameters
+    ----------
+    log : with /road/profile and the measurements
+    overrides : node -> parameter -> value, over the recorded parameters
+
+    Raises
+    ------
+    InputError
+        if the road or the measurements are missing.
+    """
+    if not has(log, topics.ROAD):
+        raise InputError("no road in the log", where=log.path, key=topics.ROAD.name, remedy="record /road/profile")
+    notes: list[str] = []
+    setups = list(read_setups(log))
+    rig, period = log.config or load_rig(), control_period(log, setups, notes)
+    given = overrides or {}
+    values = {node: plan(setups, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
+    car, _ = nominal_half_car(rig)
+    measured = measurements(log)
+    start = int(measured.stamp_ns[0])
+    road = _road(log, start, int(measured.stamp_ns[-1]), period)
+    seed = int(seed_of(log).get("plant", 0))
+    estimator = build_estimator(rig, period, values["estimator"])
+    controller = build_controller(rig, period, values["controller"])
+    run = close_loop(car, rig, estimator, controller, road, seed=seed)
+    notes.append("the run starts from rest at the trim, whatever the rig was doing when the log began")
+    notes.append(
+        "sensor noise steers the valves: with other noise than the session's, motions differ in detail, not size"
+    )
+    return Rerun(
+        run.times[:-1],
+        run.measurements,
+        run.commands,
+        (measured.stamp_ns - start) * 1e-9,
+        measured.values,
+        tuple(notes),
+    )
+
+
+def _road(log: Log, begin_ns: int, end_ns: int, period: float) -> NDArray[np.float64]:
+    """Heights (N, 2) at the control periods, linear between the recorded samples."""
+    recorded = track(log, topics.ROAD)
+    order = np.argsort(recorded.stamp_ns, kind="stable")
+    known = (recorded.stamp_ns[order] - begin_ns) * 1e-9
+    wanted = np.arange(0.0, (end_ns - begin_ns) * 1e-9 + 0.5 * period, period)
+    return np.column_stack([np.interp(wanted, known, recorded.values[order, k]) for k in range(2)])
+
+
+def compare_channels(result: Rerun) -> list[tuple[str, str, float, float, float]]:
+    """(channel, unit, std as recorded, std of the run, rms difference over the recorded std) of each channel."""
+    rows = []
+    for k, (name, unit) in enumerate(zip(CHANNELS, UNITS, strict=True)):
+        ours = np.interp(result.recorded_time, result.time, result.channels[:, k])
+        recorded = result.recorded[:, k]
+        spread = float(recorded.std())
+        gap = float(np.sqrt(np.mean((ours - recorded) ** 2)))
+        rows.append((name, unit, spread, float(result.channels[:, k].std()), gap / spread if spread else float("nan")))
+    return rows
+
+
+def draw_rerun(result: Rerun, path: Path, title: str) -> None:
+    """The measured channels as recorded and as run again, as a PNG."""
+    figure, axes = plt.subplots(len(CHANNELS), 1, figsize=(11, 13), sharex=True, constrained_layout=True)
+    for k, (axis, name, unit) in enumerate(zip(axes, CHANNELS, UNITS, strict=True)):
+        factor, shown = (1e3, "mm") if unit == "m" else (1e-3, "kPa")
+        axis.plot(result.recorded_time, result.recorded[:, k] * factor, color="#999999", lw=1.8, label="recorded")
+        axis.plot(result.time, result.channels[:, k] * factor, color="#d62728", lw=0.8, label="closed loop, model")
+        axis.set_ylabel(f"{name}\n({shown})")
+        axis.grid(alpha=0.3)
+        axis.margins(x=0)
+    axes[0].legend(loc="upper right", ncols=2)
+    axes[-1].set_xlabel("time (s)")
+    figure.suptitle(title, fontsize=10)
+    part = path.with_name(path.name + ".part")
+    figure.savefig(part, dpi=110, format="png")
+    plt.close(figure)
+    part.replace(path)

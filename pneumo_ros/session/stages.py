@@ -1,0 +1,83 @@
+"""Estimator and controller as a session runs them, without ROS: one input in, one message out, state explicit.
+
+The same pure steps in the same order as nodes/estimator.py and nodes/controller.py; a replayed session gives the
+recorded bytes again only because of that, and a test holds the two together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
+from pneumo_ros.control.half_car import build_controller
+from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
+from pneumo_ros.estimation.half_car import build_estimator
+from pneumo_ros.parameters import Value
+from pneumo_ros.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+class Output(NamedTuple):
+    """What a stage says at one sample: its message's values and, of the controller, its telemetry."""
+
+    values: Array
+    telemetry: Array
+
+
+class Stage(Protocol):
+    """One node's work."""
+
+    def first(self, given: Array) -> Any:
+        """State before the first input."""
+
+    def step(self, state: Any, given: Array) -> tuple[Any, Output]:
+        """New state and output."""
+
+
+_NOTHING = np.empty(0)
+
+
+class EstimatorStage:
+    """Measurement (6,) to estimate (16,)."""
+
+    def __init__(self, rig: Rig, period: float, values: Mapping[str, Value]) -> None:
+        self._estimator = build_estimator(rig, period, known(ESTIMATION_PARAMETERS, values), "estimator")
+
+    def first(self, given: Array) -> Any:
+        """At rest at the first measurement."""
+        return self._estimator.init(given)
+
+    def step(self, state: Any, given: Array) -> tuple[Any, Output]:
+        """One measurement."""
+        state, estimate = self._estimator.step(state, given)
+        return state, Output(estimate, _NOTHING)
+
+
+class ControllerStage:
+    """Estimate (16,) to command (4,), m2, and telemetry (6,) of /controller/sliding."""
+
+    def __init__(self, rig: Rig, period: float, values: Mapping[str, Value]) -> None:
+        self._controller = build_controller(rig, period, known(CONTROL_PARAMETERS, values), "controller")
+
+    def first(self, given: Array) -> Any:
+        """The reference starts where the estimate is."""
+        return self._controller.init(given)
+
+    def step(self, state: Any, given: Array) -> tuple[Any, Output]:
+        """One estimate; a command that is not finite is replaced by the trim, as in the node."""
+        new, command, telemetry = self._controller.step(state, given)
+        if not math.isfinite(command.sum()):
+            new, command = state, self._controller.at_rest.command
+        return new, Output(command, np.concatenate([telemetry, new[[0, 3]]]))
+
+
+def known(table: Any, values: Mapping[str, Value]) -> dict[str, Value]:
+    """The entries of ``values`` that ``table`` declares; nodes have further ones."""
+    names = {parameter.name for parameter in table}
+    return {name: value for name, value in values.items() if name in names}
