@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from pneumo_ros.cli.thesis import app
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.moving_base import bench_at, natural_frequency, response
-from pneumo_ros.thesis import beyond, chapter5, chapter6, chapter6_half, chapter6_quarter, robustness
+from pneumo_ros.thesis import beyond, chapter5, chapter6, chapter6_half, chapter6_quarter, quarter_pictures, robustness
 from pneumo_ros.thesis.book import CHAPTERS, book
 from pneumo_ros.thesis.equations import equation_index, mentioned
 from pneumo_ros.thesis.half import HalfExperiment, measure, run
@@ -145,8 +145,9 @@ def test_half_car_claims_that_the_rig_stands_on(settings: ThesisSettings) -> Non
 def test_every_claim_gets_exactly_one_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     """With fewer frequencies and curves than the page has: the shape of the whole, not its figures."""
     monkeypatch.setattr(chapter5, "FREQUENCIES", np.linspace(0.5, 18.0, 4))
-    monkeypatch.setattr(chapter6_quarter, "POLES", (5.0, 10.0, 20.0))
-    monkeypatch.setattr(chapter6_quarter, "AREAS_IN2", (5.0, 6.0))
+    for module in (chapter6_quarter, quarter_pictures):
+        monkeypatch.setattr(module, "POLES", (5.0, 10.0, 20.0))
+        monkeypatch.setattr(module, "AREAS_IN2", (5.0, 6.0))
     monkeypatch.setattr(chapter6, "CHECK_TIME", 60.0)
     monkeypatch.setattr(robustness, "VARIATIONS", {"as stated": {}})
     small = replace(load_settings(), seeds=1, duration=5.0)

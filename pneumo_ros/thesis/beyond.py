@@ -10,11 +10,12 @@ from pneumo_ros.road import iso_psd
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, nominal
-from pneumo_ros.thesis.report import Chapter, Claim, Step, verdict
+from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import KMH
 
-STEPS = 1
+STEPS = 2
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of dA/dt fed forward
 RUNS: dict[str, HalfExperiment] = {
     name: HalfExperiment(name, {}, VOLUME, False, HEIGHT_ERROR_IN)
     for name in ("thesis", "default", "area_rate_feedforward", "two_valve")
@@ -35,13 +36,38 @@ def build(settings: ThesisSettings, step: Step) -> Chapter:
         "heights "
         "read 0.2 in too large, the same valve limits."
     )
+    step("how much of dA/dt to feed forward")
+    shares = _share_table(settings)
     claims = [*_claims(o), _limit_claim(settings, o["two_valve"])]
-    return Chapter(7, "Beyond the thesis", lead, claims, [table("Half car, beyond the thesis", o)])
+    return Chapter(7, "Beyond the thesis", lead, claims, [table("Half car, beyond the thesis", o), shares])
 
 
 def reductions(better: HalfOutcome, base: HalfOutcome) -> list[float]:
     """Share by which heave rms falls, road by road."""
     return [1.0 - a.heave_rms / b.heave_rms for a, b in zip(better.rides, base.rides, strict=True)]
+
+
+def _share_table(settings: ThesisSettings) -> Table:
+    """Heave rms, and how often a valve is at a limit, over the share of dA/dt fed forward: the measured optimum."""
+    names = ("area_rate_feedforward", "two_valve")
+    runs = [
+        HalfExperiment(name, {}, {**VOLUME, "area_rate_share": share}, False, HEIGHT_ERROR_IN)
+        for name in names
+        for share in SHARES
+    ]
+    o = run_all(measure, [(settings, e) for e in runs])
+    rows = []
+    for i, name in enumerate(names):
+        part = o[i * len(SHARES) : (i + 1) * len(SHARES)]
+        rows.append([f"{name}: heave rms, m/s2", *[f"{x.heave_rms:.3f}" for x in part]])
+        rows.append([f"{name}: tyre load variation", *[f"{x.tyre_variation:.3f}" for x in part]])
+        rows.append([f"{name}: inlet shut, % of the time", *[f"{100 * x.shut:.0f}" for x in part]])
+    note = (
+        "one valve spends its time shut, waiting for the constant outlet to empty the spring; two valves fill and "
+        "empty by "
+        "turns, until near full extension no area is left to act on and the axle, freed of the spring, resonates"
+    )
+    return Table("Share of dA/dt fed forward", ["", *[f"{share:g}" for share in SHARES]], rows, note)
 
 
 def _claims(o: Mapping[str, HalfOutcome]) -> list[Claim]:

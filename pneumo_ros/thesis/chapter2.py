@@ -81,7 +81,7 @@ def _spectra(settings: ThesisSettings) -> Picture:
     for hours in (1 / 60, 1.0, 8.0):
         axes[0].loglog(f, iso_1972_limit(f, hours), "k--", lw=0.7)
         axes[0].annotate(f"{hours:.2g} h", (60.0, float(iso_1972_limit(60.0, hours))), fontsize=7)
-    axes[0].set(xlabel="Hz", ylabel="m/s2 rms per third octave, full scale")
+    axes[0].set(xlabel="Hz", ylabel="m/s2 rms per third octave, full scale", ylim=(1e-2, 50.0))
     axes[0].legend(fontsize=7)
     shown = ", ".join(f"{hours:.3g}" for hours in ISO_1972_HOURS)
     return Picture(

@@ -144,8 +144,11 @@ def table(title: str, o: Mapping[str, HalfOutcome]) -> Table:
         ]
         for name, x in o.items()
     ]
-    note = "accelerations of the rig; full scale = rig x 5; 1972 limit: longest exposure within fatigue-decreased "
-    "proficiency"
+    note = (
+        "accelerations of the rig; full scale = rig x 5; 1972 limit: longest exposure within fatigue-decreased "
+        "proficiency; "
+        "Janeway: worst third octave over its limit"
+    )
     return Table(title, header, rows, note)
 
 

@@ -7,67 +7,26 @@ from collections.abc import Mapping
 import numpy as np
 
 from pneumo_ros.thesis.ensemble import run_all
-from pneumo_ros.thesis.linearised import area_stiffness_share, body_mode
-from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, plant, run
-from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas, verdict
+from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, run
+from pneumo_ros.thesis.quarter_experiments import AREAS_IN2, CURVES, ESTIMATED, EXPERIMENTS, K2000, POLES
+from pneumo_ros.thesis.quarter_pictures import (
+    area_picture,
+    curves_picture,
+    cylinder_table,
+    modes_table,
+    outcome_table,
+    pairs_picture,
+    response_picture,
+)
+from pneumo_ros.thesis.report import Claim, Picture, Step, Table, verdict
 from pneumo_ros.thesis.robustness import SLIDING, robustness_table
 from pneumo_ros.thesis.settings import ThesisSettings
-from pneumo_ros.units import INCH, SQUARE_INCH
 
 STEPS = 4
-POLES = (2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0)  # 1/s
-AREAS_IN2 = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)  # Section 6.3: estimated by a constant in 1 to 6 in2
-
-CONSTANT: dict[str, float | str] = {"area_in2": 6.0, "volume_in3": 4.0}  # Figure 6.15
-UNCERTAIN: dict[str, float | str] = {"volume_in3": 4.0, "height_error_in": 0.4}  # Figures 6.16 to 6.25
-K2000: dict[str, float | str] = {**UNCERTAIN, "sliding_in_s3": 2000.0, "layer_in_s": 2.0}
-
-EXPERIMENTS: dict[str, Experiment] = {
-    "passive": Experiment("passive"),
-    "flc 10": Experiment("flc", options={"area_in2": 6.0}),
-    "flc 50": Experiment("flc", options={"area_in2": 6.0, "pole": 50.0}),
-    "flc volume": Experiment("flc", options=CONSTANT),
-    "mrflc": Experiment("mrflc", options={"area_in2": 6.0}),
-    "third_order_integral_smc": Experiment("third_order_integral_smc", options=CONSTANT),
-    "third_order_smc": Experiment("third_order_smc", options=CONSTANT),
-    "third_order_smflc": Experiment("third_order_smflc", options=CONSTANT),
-    "first_order_smflc": Experiment("first_order_smflc", options=CONSTANT),
-    "K 1000": Experiment("first_order_smflc", options={**UNCERTAIN, "area_in2": 6.0}),
-    "K 10000": Experiment(
-        "first_order_smflc", options={**UNCERTAIN, "area_in2": 6.0, "sliding_in_s3": 10000.0, "layer_in_s": 5.0}
-    ),
-    "K 2000": Experiment("first_order_smflc", options={**K2000, "area_in2": 6.0}),
-    "bounded": Experiment("first_order_smflc", options=K2000),
-    "exponential": Experiment("first_order_smflc", options={**K2000, "method": "exponential"}),
-    "least_squares": Experiment("first_order_smflc", options={**K2000, "method": "least_squares"}),
-    "gradient": Experiment("first_order_smflc", options={**K2000, "method": "gradient"}),
-    "payload": Experiment("first_order_smflc", options={**K2000, "mass_scale": 2.0}),
-}
 RESONANCE = (
-    "dA/dt = 0 leaves out the area's own stiffness, two thirds of the spring's; an area believed as 6 where 1.5 in2 "
-    "is true "
-    "quarters the gain that should damp it: a mode near 3 Hz is left (table of linearised loops), on any road"
+    "dA/dt = 0 leaves out the area's own stiffness, two thirds of the spring's, and an area believed as 6 where "
+    "1.5 in2 is true quarters the gain that should damp it: a mode near 3 Hz is left on any road (linearised loops)"
 )
-CURVES: dict[str, tuple[str, bool, dict[str, float | str]]] = {
-    "Figure 6.4: FLC, cylinder": ("flc", True, {}),
-    "Figure 6.6: FLC, air spring": ("flc", False, {}),
-    "Figure 6.13: MRFLC, air spring": ("mrflc", False, {}),
-    "Figure 6.16: first order SMFLC, K 10000": (
-        "first_order_smflc",
-        False,
-        {**UNCERTAIN, "sliding_in_s3": 10000.0, "layer_in_s": 5.0},
-    ),
-}
-ESTIMATED = "Figure 6.23: first order SMFLC with estimator"
-
-PAIRS = {
-    "Figure 6.9: gain": ("flc 10", "flc 50"),
-    "Figure 6.11: volume": ("flc 10", "flc volume"),
-    "Figure 6.14: reference": ("flc 10", "mrflc"),
-    "Figure 6.18: K_s, phi": ("K 1000", "K 10000"),
-    "Figure 6.20: estimator": ("K 2000", "bounded"),
-    "Figure 6.24: payload": ("bounded", "payload"),
-}
 
 Outcomes = Mapping[str, Outcome]
 
@@ -90,12 +49,17 @@ def build_quarter(settings: ThesisSettings, step: Step) -> tuple[list[Claim], li
     ]
     return (
         claims,
-        [_table(outcomes), _modes_table(settings), robust],
         [
-            _curves_picture(curves),
-            _response_picture(settings),
-            _pairs_picture(settings),
-            _area_picture(settings),
+            outcome_table("Quarter car on the air spring", outcomes),
+            cylinder_table(settings),
+            modes_table(settings),
+            robust,
+        ],
+        [
+            curves_picture(curves),
+            response_picture(settings),
+            pairs_picture(settings),
+            area_picture(settings),
         ],
     )
 
@@ -306,98 +270,3 @@ def _estimator_claims(
 def _area_factor(settings: ThesisSettings) -> float:
     r = run(settings, EXPERIMENTS["payload"], 1)
     return float(np.median(r.estimated_areas[settings.settled :] / r.areas[settings.settled :]))
-
-
-def _table(o: Outcomes) -> Table:
-    header = [
-        "experiment",
-        "rms, g full scale",
-        "MPR",
-        "rise, s",
-        "overshoot, in",
-        "offset, in",
-        "area error, in2",
-        "valve at a limit, %",
-        "tyre load variation",
-    ]
-    rows = [
-        [
-            name,
-            f"{x.rms_g:.3f}",
-            f"{x.rating:.2f}",
-            f"{x.rise:.2f}",
-            f"{x.overshoot_in:.2f}",
-            f"{x.offset_in:.3f}",
-            f"{x.area_error_in2:.3f}",
-            f"{100 * x.saturated:.1f}",
-            f"{x.tyre_variation:.3f}",
-        ]
-        for name, x in o.items()
-    ]
-    return Table("Quarter car, class D road", header, rows, "rms over all roads after the settling time")
-
-
-def _modes_table(settings: ThesisSettings) -> Table:
-    total, share = area_stiffness_share(settings)
-    rows = []
-    for name, experiment in EXPERIMENTS.items():
-        if experiment.law != "passive":
-            mode = body_mode(settings, experiment)
-            rows.append([name, f"{mode.frequency_hz:.2f}", f"{mode.damping_ratio:+.3f}"])
-    note = (
-        f"about rest, continuous time, no valve limits, an estimated area counting as known; stiffness at rest "
-        f"{total:.0f} "
-        f"lb/in, {100 * share:.0f} % of it the area's; a negative ratio grows until the valve limits it"
-    )
-    return Table("Linearised loops: least damped body mode", ["experiment", "Hz", "damping ratio"], rows, note)
-
-
-def _curves_picture(curves: dict[str, np.ndarray]) -> Picture:
-    figure, axes = canvas(2, 3, width=12.0)
-    for axis, (name, grid) in zip(axes, curves.items(), strict=False):
-        for i, row in enumerate(grid):
-            axis.semilogy(POLES, row, "o-", ms=3, label=f"{AREAS_IN2[i]:g} in2" if len(grid) > 1 else "estimated")
-        axis.set(title=name, xlabel="triple pole, 1/s", ylabel="rms, g full scale")
-    axes[0].legend(fontsize=7)
-    axes[-1].set_visible(False)
-    return Picture("Sensitivity curves (Figures 6.4, 6.6, 6.13, 6.16, 6.23)", figure, "believed area as parameter")
-
-
-def _response_picture(settings: ThesisSettings) -> Picture:
-    figure, axes = canvas(1, 2, width=12.0)
-    for name in ("passive", *SLIDING):
-        r = run(settings, EXPERIMENTS[name], 1)
-        axes[0].plot(r.times, (r.states[:, 0] - r.states[-1, 0]) / INCH, lw=0.8, label=name)
-        axes[1].plot(r.times[:-1], r.inlets / SQUARE_INCH, lw=0.8)
-    axes[0].set(xlabel="s", ylabel="heave about its end, in")
-    axes[1].set(xlabel="s", ylabel="inlet, in2")
-    axes[0].legend(fontsize=7)
-    return Picture("Figure 6.15: the sliding family", figure, "start below design height, seed 1")
-
-
-def _pairs_picture(settings: ThesisSettings) -> Picture:
-    """The thesis's comparisons two by two: heave about the target, and tyre force."""
-    figure, axes = canvas(2, len(PAIRS), width=3.2 * len(PAIRS), height=2.4)
-    for i, (title, names) in enumerate(PAIRS.items()):
-        car, trim = plant(settings, False)
-        for name in names:
-            r = run(settings, EXPERIMENTS[name], 1)
-            axes[i].plot(r.times, (r.states[:, 0] - trim.state[0]) / INCH, lw=0.7, label=name)
-            force = car.corner.tyre_stiffness * (r.road - r.states[:, 1])
-            axes[len(PAIRS) + i].plot(r.times, force, lw=0.5)
-        axes[i].set_title(title, fontsize=8)
-        axes[i].legend(fontsize=6)
-        axes[len(PAIRS) + i].set_xlabel("s")
-    axes[0].set_ylabel("heave, in")
-    axes[len(PAIRS)].set_ylabel("tyre force, N")
-    return Picture("Figures 6.9 to 6.24: comparisons", figure, "seed 1; heave about the target")
-
-
-def _area_picture(settings: ThesisSettings) -> Picture:
-    figure, axes = canvas(1, 1, width=10.0)
-    r = run(settings, EXPERIMENTS["bounded"], 1)
-    axes[0].plot(r.times[:-1], r.areas / SQUARE_INCH, label="true")
-    axes[0].plot(r.times[:-1], r.estimated_areas / SQUARE_INCH, "--", label="estimated")
-    axes[0].set(xlabel="s", ylabel="effective area, in2", xlim=(0.0, 4.0), ylim=(0.0, 4.0))
-    axes[0].legend()
-    return Picture("Figure 6.21: estimated area", figure, "bounded forgetting, exact accelerations")

@@ -60,7 +60,7 @@ class HalfOutcome:
     heave_rms, pitch_rms : over all roads, m/s2 and rad/s2 of the rig
     rating, weighted, hours, janeway, healey : of the full-scale heave; weighted in m/s2 (Wk), hours of the 1972 limit
     inlet_rms_in2, inlet_peak_in2 : front and rear, in2
-    saturated : share of time an inlet is fully open
+    saturated, shut : share of time an inlet is fully open, and shut
     area_error_in2 : rms error of the area estimates after 1 s, in2
     tyre_mean : mean tyre forces front and rear, N
     """
@@ -76,6 +76,7 @@ class HalfOutcome:
     inlet_rms_in2: tuple[float, float]
     inlet_peak_in2: tuple[float, float]
     saturated: float
+    shut: float
     area_error_in2: float
     tyre_mean: tuple[float, float]
 
@@ -256,6 +257,7 @@ def _outcome(
         inlet_rms_in2=_pair(np.sqrt(np.mean(inlets**2, axis=0)) / SQUARE_INCH),
         inlet_peak_in2=_pair(np.quantile(inlets, 0.999, axis=0) / SQUARE_INCH),
         saturated=float(np.mean(inlets >= limit)),
+        shut=float(np.mean(inlets <= 0.0)),
         area_error_in2=float(np.sqrt(np.mean(np.square(area_errors)))) / SQUARE_INCH if area_errors else 0.0,
         tyre_mean=_pair(mean),
     )

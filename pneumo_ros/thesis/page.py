@@ -27,7 +27,7 @@ figure { margin: 1rem 0 } figcaption, .note { color: #555; font-size: 13px } cod
 <h1>The thesis, recomputed</h1>
 <p>{{ held }} of {{ total }} claims hold. Each that does not says why. Settings: {{ settings }}.</p>
 <nav>{% for c in chapters %}<a href="#c{{ c.number }}">{{ c.title }}</a>{{ " | " if not loop.last }}{% endfor %}
-{% if equations %}| <a href="#equations">equations</a>{% endif %}</nav>
+{% if equations %} | <a href="#equations">equations</a>{% endif %}</nav>
 {% for c in chapters %}
 <h2 id="c{{ c.number }}">{{ heading(c) }}</h2><p>{{ c.lead }}</p>
 {% if c.claims %}<table><caption>Claims</caption>
