@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_logs import channels_of, excitation, signals_of, simulated, topics_of_channels
+from rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
 from pneumo_ros.gap.model import Active
