@@ -20,7 +20,7 @@ def shared() -> Path:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Real-time tests get two more tries: a stall of a shared machine is not the code's; the bounds stay as they are."""
+    """Real-time tests get two more tries: a stall of a shared machine is not the code's; the bounds stay."""
     for item in items:
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=1))

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.session.cdr import JointEncoder, PressureEncoder
+from pneumo_ros.session.topics import COMMAND, DISPLACEMENT, FRONT_PRESSURE, JOINT, REAR_PRESSURE, ROAD, STRING
+from pneumo_ros.session.writing import LogWriter
 
 RATE = 500.0
 DISPLACEMENT_NOISE, PRESSURE_NOISE = 1e-5, 150.0
@@ -48,35 +54,55 @@ def simulated(
     return channels_of(states, rig), road, commands
 
 
-def topics(seconds: float = 8.0, seed: int = 0) -> dict[str, TopicData]:
-    """The topics of a contract log of the nominal rig, with sensor noise."""
-    clean, road, commands = simulated(seconds, seed)
-    rng = np.random.default_rng(seed + 1000)
-    noise = np.array([DISPLACEMENT_NOISE] * 4 + [PRESSURE_NOISE] * 2)
-    y = clean + rng.normal(size=clean.shape) * noise
-    t = np.arange(len(y)) / RATE
+def topics_of_channels(channels: np.ndarray, road: np.ndarray, commands: np.ndarray) -> dict[str, TopicData]:
+    """The topics of a contract log that holds these channels."""
+    t = np.arange(len(channels)) / RATE
     return {
         "/road/profile": TopicData(t, dict(zip(ROADS, road.T, strict=True)), t + 1e-4),
         "/valve/command": TopicData(t, dict(zip(COMMANDS, commands.T, strict=True)), t + 1e-4),
-        "/rig/displacement": TopicData(t, dict(zip(MEASURED[:4], y[:, :4].T, strict=True)), t + 1e-4),
-        "/rig/front/pressure": TopicData(t, {"pressure": y[:, 4]}, t + 1e-4),
-        "/rig/rear/pressure": TopicData(t, {"pressure": y[:, 5]}, t + 1e-4),
+        "/rig/displacement": TopicData(t, dict(zip(MEASURED[:4], channels[:, :4].T, strict=True)), t + 1e-4),
+        "/rig/front/pressure": TopicData(t, {"pressure": channels[:, 4]}, t + 1e-4),
+        "/rig/rear/pressure": TopicData(t, {"pressure": channels[:, 5]}, t + 1e-4),
     }
+
+
+def noisy(channels: np.ndarray, seed: int) -> np.ndarray:
+    """Channels with the nominal rig's sensor noise added."""
+    noise = np.array([DISPLACEMENT_NOISE] * 4 + [PRESSURE_NOISE] * 2)
+    return channels + np.random.default_rng(seed).normal(size=channels.shape) * noise
+
+
+def topics(seconds: float = 8.0, seed: int = 0) -> dict[str, TopicData]:
+    """The topics of a contract log of the nominal rig, with sensor noise."""
+    clean, road, commands = simulated(seconds, seed)
+    return topics_of_channels(noisy(clean, seed + 1000), road, commands)
 
 
 def signals_of(
     channels: np.ndarray, road: np.ndarray, commands: np.ndarray, seed: int = 0, name: str = "log"
 ) -> Signals:
     """Signals of given channels with noise added, as a contract log would give them."""
-    rng = np.random.default_rng(seed + 2000)
-    noise = np.array([DISPLACEMENT_NOISE] * 4 + [PRESSURE_NOISE] * 2)
-    y = channels + rng.normal(size=channels.shape) * noise
-    t = np.arange(len(y)) / RATE
-    parts = {
-        "/road/profile": TopicData(t, dict(zip(ROADS, road.T, strict=True))),
-        "/valve/command": TopicData(t, dict(zip(COMMANDS, commands.T, strict=True))),
-        "/rig/displacement": TopicData(t, dict(zip(MEASURED[:4], y[:, :4].T, strict=True))),
-        "/rig/front/pressure": TopicData(t, {"pressure": y[:, 4]}),
-        "/rig/rear/pressure": TopicData(t, {"pressure": y[:, 5]}),
-    }
-    return prepare(parts, load_rig(), name)
+    return prepare(topics_of_channels(noisy(channels, seed + 2000), road, commands), load_rig(), name)
+
+
+def write_log(path: Path, channels: np.ndarray, road: np.ndarray, commands: np.ndarray, configs: list[str]) -> Path:
+    """A contract log as a file, with any number of configs in it."""
+    writer, store = LogWriter(path), get_typestore(Stores.ROS2_JAZZY)
+    stamps = [10**18 + k * 2_000_000 for k in range(len(channels))]
+    config = writer.add_topic("/rig/config", STRING)
+    for k, text in enumerate(configs):
+        writer.write(config, bytes(store.serialize_cdr(store.types[STRING](data=text), STRING)), stamps[0] + k)
+    tables = {
+        ROAD: road, COMMAND: commands, DISPLACEMENT: channels[:, :4], FRONT_PRESSURE: channels[:, 4:5],
+        REAR_PRESSURE: channels[:, 5:],
+    }  # fmt: skip
+    for topic, values in tables.items():
+        channel = writer.add_topic(topic.name, topic.type)
+        for stamp, row in zip(stamps, values.tolist(), strict=True):
+            if topic.type == JOINT:
+                data = JointEncoder(topic.frame_id, topic.names).encode(stamp, row)
+            else:
+                data = PressureEncoder(topic.frame_id, PRESSURE_NOISE**2).encode(stamp, row[0])
+            writer.write(channel, data, stamp)
+    writer.finish()
+    return path

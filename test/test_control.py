@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pneumo_ros.comfort import mean_personal_rating, rms, tyre_load_variation
-from pneumo_ros.control.half_car import CONTROLLERS, PARAMETERS, Controller, build_controller
+from pneumo_ros.control.half_car import CONTROLLERS, PARAMETERS, Controller, build_controller, control_half_car
 from pneumo_ros.control.laws.common import Error, Gains, saturation
 from pneumo_ros.control.laws.family import LAWS, wanted_jerk
 from pneumo_ros.control.linearisation import Compensation, Spring, force_rates, openings
@@ -240,3 +240,16 @@ def test_bad_parameter_is_one_line_with_its_range(rig: Rig, key: str, value: obj
 def test_mean_personal_rating_is_limited_and_in_g() -> None:
     assert mean_personal_rating(0.05 * GRAVITY) == pytest.approx(3.43)
     assert mean_personal_rating(0.0) == 5.0 and mean_personal_rating(10.0) == 0.0
+
+
+@pytest.mark.parametrize("name", CONTROLLERS[1:])
+def test_packed_parameters_are_the_controllers(name: str) -> None:
+    """The one array that a session hands to compiled code holds every parameter in its place."""
+    controller = build_controller(load_rig(), 0.002, {"controller": name, "height_error_in": 0.2, "mass_scale": 1.3})
+    rng = np.random.default_rng(3)
+    typical = np.array([0.02, 0.016, 0.1, 0.1, 1, 2, 0.045, 0.046, 0.1, 0.1, 1, 1, 2.7e5, 4.2e5, 1e-3, 1e-3])
+    for _ in range(10):
+        estimate, state = typical * rng.uniform(0.8, 1.2, 16), rng.normal(0.0, 0.01, 8)
+        whole = control_half_car(state, estimate, controller.law, controller.front, controller.rear, controller.surface)
+        for packed, direct in zip(controller.step(state, estimate), whole, strict=True):
+            np.testing.assert_array_equal(packed, direct)

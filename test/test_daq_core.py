@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.daq.board import board_identity
@@ -15,6 +19,7 @@ from pneumo_ros.daq.core import DriverCore, Phase
 from pneumo_ros.daq.device import Device
 from pneumo_ros.daq.frames import DeviceState, Hello, OutputRange, encode
 from pneumo_ros.daq.intake import Measurement
+from pneumo_ros.daq.limits import MEASURED, LimitMonitor
 from pneumo_ros.daq.reasons import Event, Reason
 from pneumo_ros.daq.safety_config import Limit, SafetyConfig, load_safety
 from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
@@ -95,9 +100,9 @@ class Bench:
 
     def armed(self) -> Bench:
         self.controller = self.hold_trim
-        self.run(1200)
+        self.run(700)
         assert self.core.arm(self.now) == []
-        self.run(500)
+        self.run(300)
         assert self.core.mode is Mode.ARMED and self.device.state is DeviceState.ARMED
         return self
 
@@ -330,6 +335,16 @@ def test_limits_warn_then_trip_after_their_persistence(estop: bool) -> None:
     assert 15 <= bench.safe_after(outside[0]) < 50
 
 
+def test_a_quantity_that_hovers_at_its_limit_is_one_warning() -> None:
+    limits = LimitMonitor({name: Limit(-math.inf, math.inf, -math.inf, math.inf, 0.0, False) for name in MEASURED}
+                          | {"front_pressure": Limit(1e5, 4e5, -math.inf, math.inf, 0.0, False)})  # fmt: skip
+    rng, told = random.Random(1), []
+    for i in range(4000):
+        pressure = 4e5 + rng.gauss(0.0, 1e3) if i < 2000 else 3.9e5
+        told += limits.step([0.03, 0.03, -0.016, -0.016, pressure, 4e5, 7.9e5], 1e-3)
+    assert [finding.reason for finding in told] == [Reason.LIMIT_WARN, Reason.LIMIT_CLEAR]
+
+
 def test_frames_that_pass_the_crc_by_chance_must_continue_the_counters() -> None:
     bench = Bench().run(100)
     count = len(bench.measurements)
@@ -366,3 +381,40 @@ def test_the_printed_calibration_is_flagged_at_load() -> None:
     bench = Bench(calibration="appendix_c").run(50)
     assert {Reason.CALIBRATION_DOUBTFUL, Reason.CHANNEL_UNWATCHED} <= set(bench.reasons())
     assert Reason.CALIBRATION_DOUBTFUL not in Bench().run(50).reasons()
+
+
+def test_commands_stop_when_nobody_watches_the_timeouts() -> None:
+    bench = Bench().armed()
+    stamp = bench.measurements[-1].stamp_ns
+    bench.core.command([1e-6] * 4, stamp + 100 * MS, bench.now + 110 * MS)
+    bench._take()
+    assert bench.core.mode is Mode.SAFE and bench.reasons()[-1] is Reason.DRIVER_FAILED
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(st.one_of(st.binary(max_size=80), st.integers(0, 200)), max_size=40), st.integers(0, 2**32 - 1))
+def test_no_bytes_from_the_board_can_break_the_driver(steps: list[bytes | int], seed: int) -> None:
+    """Noise, replayed, reordered and truncated frames, at any pace: no exception, and nothing arms."""
+    rng, now, sent = random.Random(seed), START, bytearray()
+    core = DriverCore(load_safety(), load_calibration(), RIG, sent.extend)
+    core.opened(now)
+    device = Device(board_identity(), sent.extend, lambda counts: None)
+    device.boot(0)
+    for step in steps:
+        if isinstance(step, int):
+            now += step * MS
+            core.tick(now)
+            device.receive(bytes(sent), now // 1000 % 2**32)
+            continue
+        device.tick(now // 1000 % 2**32, tuple(rng.randrange(-(2**31), 2**31) for _ in range(7)))
+        frames = bytes(sent)
+        core.receive(step + frames[rng.randrange(len(frames) + 1) :], now)
+        core.command([rng.uniform(-1, 1)] * 4, now, now)
+    core.drain()
+    assert core.mode is not Mode.ARMED and device.state is not DeviceState.ARMED
+
+
+def test_every_reason_is_documented() -> None:
+    page = (Path(__file__).resolve().parent.parent / "docs" / "hardware.md").read_text(encoding="utf-8")
+    for reason in Reason:
+        assert f"| `{reason.code}` | {reason.value} |" in page

@@ -29,6 +29,7 @@ from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.rig import load_rig
 from pneumo_ros.session import topics
 from pneumo_ros.session.dashboard.panels import MOTION, TYRES, Samples, derive, thin
+from pneumo_ros.session.dashboard.ring import Ring
 from pneumo_ros.session.dashboard.server import is_loopback
 from pneumo_ros.session.dashboard.source import Playback
 from pneumo_ros.session.inspection import read_events
@@ -200,3 +201,13 @@ def assert_valves_closed(log: object, after_ns: int) -> None:
     for height, pressure in zip(heights, x[:, 8:10].T, strict=True):
         air = pressure * (VOLUME_OFFSET + MEAN_AREA * height) ** rig.polytropic_exponent.value
         assert np.ptp(air) < 1e-3 * air.mean()
+
+
+def test_ring_keeps_the_newest_and_begins_again_when_time_goes_back() -> None:
+    ring = Ring(("a",), capacity=4)
+    for i in range(6):
+        ring.append(10 * i, [float(i)])
+    assert ring.since(0).time_ns.tolist() == [20, 30, 40, 50]
+    assert ring.since(35).values[:, 0].tolist() == [4.0, 5.0]
+    ring.append(5, [9.0])
+    assert ring.since(0).time_ns.tolist() == [5]

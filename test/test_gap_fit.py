@@ -22,7 +22,7 @@ from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 
-QUICK = Effort(singles=5, finalists=3, leaders=1, seconds=2, blind_pairs=1, pair_finalists=2)
+QUICK = Effort(singles=5, finalists=3, seconds=(2,), blind_pairs=1, pair_finalists=2)
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_jumps_between_samples_are_timed(model: RigModel) -> None:
     ("truth", "verdict", "side", "place"),
     [
         ((), "none", None, None),
-        ((Active("leak", "front", (3e-7,)),), "leak", "front", "front_air"),
+        ((Active("leak", "front", (3e-7, 0.0)),), "leak", "front", "front_air"),
         ((Active("lvdt_scale", "sprung_rear", (0.03,)),), "lvdt_scale", None, "sensor:sprung_rear"),
     ],
 )
@@ -136,7 +136,7 @@ def test_verdict_side_and_place(
         assert best.side == side and best.shrink > 0.8
         assert best.shrink_ci90[0] <= best.shrink <= best.shrink_ci90[1]
         assert found.gap.best < found.gap.refit < found.gap.nominal
-        (estimate,) = best.parameters.values()
+        estimate = next(iter(best.parameters.values()))
         assert abs(estimate.value - truth[0].values[0]) < 3.0 * estimate.std + 0.02 * abs(estimate.value)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,11 +12,15 @@ import pytest
 from rig_logs import signals_of, simulated
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.report import Findings, render, write_report, write_residual_log
+from pneumo_ros.gap.diagnosis import Diagnosis, Estimate, Gap, Ranked
+from pneumo_ros.gap.model import Active
+from pneumo_ros.gap.report import Findings, render, write_outputs, write_report, write_residual_log
 from pneumo_ros.gap.report.contents import headline, place_words, readable, rounded
 from pneumo_ros.gap.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.gap.report.rig_map import colour, draw_map
+from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED
+from pneumo_ros.rig import load_rig
 from pneumo_ros.session.reading import read_log
 
 PLACES = (
@@ -178,3 +183,28 @@ def test_the_residual_log_holds_what_was_measured_and_predicted(tmp_path: Path) 
     assert np.all(np.isnan(pressure[10:20])) and np.isfinite(pressure).sum() == len(pressure) - 10
     assert np.all(np.diff(measured.stamp_ns) == 2_000_000)
     assert back.config == log.rig and {"/nominal/rig/rear/pressure", "/refit/rig/displacement"} <= set(back.topics)
+
+
+def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
+    """A rig with a leak, diagnosed by hand: the page shows what is missing as a flow over a quantity."""
+    model = RigModel(load_rig())
+    active = (Active("leak", "front", (4e-7,)),)
+    logs = []
+    for seed in (4, 5):
+        clean, road, commands = simulated(8.0, seed)
+        carrier = signals_of(clean, road, commands, seed)
+        logs.append(signals_of(model.simulate(carrier, active=active), road, commands, seed, f"log{seed}.mcap"))
+    fit, holdout = logs
+    nominal, best = model.simulate(holdout), model.simulate(holdout, active=active)
+    gap = Gap(1.0, 0.9, 0.01, 0.004, {name: {"nominal": 1.0, "refit": 0.9, "best": 0.01} for name in MEASURED})
+    ranked = Ranked(
+        ("leak",), ("front",), "front", 0.97, {"leak_area": Estimate(4e-7, 1e-9, "m2")}, 0.01, 0.99, (0.98, 0.99)
+    )
+    runs = {"nominal": nominal, "refit": nominal, "best": best}
+    found = Diagnosis("leak", 0.97, (("front_air", 0.98),), (ranked,), (), gap, {}, active, trajectories=runs)
+    written = write_outputs(tmp_path / "new", found, model, [fit], holdout)
+    assert [path.name for path in written] == ["diagnosis.json", "report.html", "residual.mcap"]
+    assert all(path.is_file() for path in written) and not list((tmp_path / "new").glob("*.part"))
+    page = written[1].read_text()
+    assert "missing inflow" in page and "seen in the balance of the front air" in page
+    assert json.loads(written[0].read_text())["verdict"] == "leak"

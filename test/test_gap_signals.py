@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_logs import DISPLACEMENT_NOISE, PRESSURE_NOISE, RATE, simulated, topics
+from rig_logs import DISPLACEMENT_NOISE, PRESSURE_NOISE, RATE, simulated, topics, write_log
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, check_pair, prepare, read_signals
@@ -320,3 +320,34 @@ def test_a_log_of_another_writer_is_read(shared: Path) -> None:
     signals = read_signals(shared / "logs" / "practice" / "nominal-exact-fit.mcap")
     assert signals.measured.shape == (7500, 6) and signals.limitations == ()
     assert signals.rig.name == "half-car-2m2a" and signals.period == 0.002
+
+
+def test_a_written_log_reads_as_it_was_made(tmp_path: Path) -> None:
+    clean, road, commands = simulated(3.0)
+    signals = read_signals(write_log(tmp_path / "one.mcap", clean, road, commands, [load_rig().to_yaml()]))
+    np.testing.assert_array_equal(signals.measured, clean)
+    np.testing.assert_allclose(signals.commands, commands, rtol=1e-12)
+    assert signals.start == pytest.approx(1e9) and signals.rig == load_rig()
+
+
+def test_a_log_without_config_needs_a_rig(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "bare.mcap", *simulated(3.0), [])
+    with pytest.raises(InputError, match=r"no /rig/config.*--rig"):
+        read_signals(path)
+    assert read_signals(path, load_rig()).rig == load_rig()
+
+
+def test_a_config_that_changes_during_the_log_is_refused(tmp_path: Path) -> None:
+    other = load_rig().with_values(sprung_mass=55.0).to_yaml()
+    same = write_log(tmp_path / "same.mcap", *simulated(3.0), [load_rig().to_yaml()] * 2)
+    assert read_signals(same).rig == load_rig()
+    mixed = write_log(tmp_path / "mixed.mcap", *simulated(3.0), [load_rig().to_yaml(), other])
+    with pytest.raises(InputError, match="two rigs are mixed"):
+        read_signals(mixed)
+
+
+def test_a_broken_config_is_said_in_one_line(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "broken.mcap", *simulated(3.0), ["rig: {sprung_mass: {value: -3, unit: kg}}"])
+    with pytest.raises(InputError, match="out of range") as error:
+        read_signals(path)
+    assert "\n" not in str(error.value)

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_logs import channels_of, excitation, signals_of, simulated
+from rig_logs import channels_of, excitation, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
-from pneumo_ros.gap.signals import MEASURED, Signals, read_signals
+from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, prepare, read_signals
 from pneumo_ros.gap.where import Start, conditional_gaps, habitat, locate, place_gaps, predict_located
 from pneumo_ros.gap.where.design import car_of, design_of, inputs_of, sensor_noise
 from pneumo_ros.gap.where.locate import corrected_residual
 from pneumo_ros.gap.where.regimes import bands, harmonics, regimes
-from pneumo_ros.gap.where.solve import best_subset, box_minimum, forms_of, shapley
+from pneumo_ros.gap.where.solve import Rows, best_subset, box_minimum, forms_of, shapley
 from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
@@ -86,7 +86,9 @@ def test_shares_add_up_and_equals_share_equally() -> None:
     rng = np.random.default_rng(1)
     shape, other = rng.normal(size=(2, 400))
     columns = np.column_stack([rng.normal(size=400), shape, shape, other])
-    forms = forms_of((-3.0 * shape - other, columns), (-3.0 * shape - other, columns), np.zeros(1), ["a", "b", "c"])
+    forms = forms_of(
+        Rows(-3.0 * shape - other, columns, {}), Rows(-3.0 * shape - other, columns, {}), np.zeros(1), ["a", "b", "c"]
+    )
     shares = shapley(forms, ["a", "b", "c"])
     assert sum(shares.values()) == pytest.approx(forms.value(()) - forms.value(["a", "b", "c"]), rel=1e-9)
     assert shares["a"] == pytest.approx(shares["b"], rel=1e-3) and shares["a"] > shares["c"] > 0.0
@@ -99,7 +101,7 @@ def test_exchange_finds_two_places_that_only_work_together() -> None:
     decoy = left + right + 0.3 * rng.normal(size=500)
     residual = -10.0 * (left + right)
     columns = np.column_stack([1e-6 * rng.normal(size=500), left, right, decoy])
-    forms = forms_of((residual, columns), (residual, columns), np.zeros(1), ["left", "right", "decoy"])
+    forms = forms_of(Rows(residual, columns, {}), Rows(residual, columns, {}), np.zeros(1), ["left", "right", "decoy"])
     names = ["left", "right", "decoy"]
     assert best_subset(forms, 1, [], names) == ["decoy"]
     assert set(best_subset(forms, 2, ["decoy"], names)) == {"left", "right"}
@@ -174,6 +176,32 @@ def test_a_missing_channel_leaves_the_equations_that_do_not_need_it(model: RigMo
     used = {name for e, name in enumerate(EQUATIONS) if design.weight[:, e].any()}
     assert used == {"front_axle", "front_air"}
     assert locate(model, [logs[0]], logs[1]).shares[0][0] == "front_air"
+
+
+@pytest.mark.parametrize("lost", [("sprung_front",), ("front_pressure",), MEASURED[:4], MEASURED])
+def test_channels_that_are_not_there_do_no_harm(model: RigModel, lost: tuple[str, ...]) -> None:
+    """From what is left something finite is said, and a place that needs the lost channel is not blamed."""
+    active = active_of(model, CASES["tyre damping front"][0])
+    logs = []
+    for seed in (4, 5):
+        clean, road, commands = simulated(6.0, seed)
+        full = topics_of_channels(
+            model.simulate(signals_of(clean, road, commands, seed), active=active), road, commands
+        )
+        logs.append(prepare({name: without(data, name, lost) for name, data in full.items()}, load_rig()))
+    location = locate(model, [logs[0]], logs[1])
+    assert all(np.isfinite(value) for value in location.level.values())
+    assert all(0.0 <= share <= 1.5 for _, share in location.shares)
+    assert not {f"sensor:{name}" for name in lost} & set(location.chosen)
+    if len(lost) > 1:
+        assert location.flat
+
+
+def without(data: TopicData, topic: str, lost: tuple[str, ...]) -> TopicData:
+    """A topic with the samples of lost channels turned into NaN, as a log without them reads."""
+    own = {"/rig/front/pressure": "front_pressure", "/rig/rear/pressure": "rear_pressure"}.get(topic)
+    gone = {name: np.full_like(v, np.nan) for name, v in data.channels.items() if (own or name) in lost}
+    return data._replace(channels={**data.channels, **gone})
 
 
 def test_friction_shows_as_a_force_that_turns_with_velocity(model: RigModel) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
 from mcap_ros2.reader import read_ros2_messages
 from rosbags.rosbag2 import StoragePlugin
@@ -234,6 +235,30 @@ def test_split_files_are_joined_in_the_listed_order(tmp_path: Path) -> None:
     assert read_log(tmp_path).joint("/x").position[:, 0].tolist() == [1, 2, 3, 4]
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [b.mcap]}")
     assert read_log(tmp_path).joint("/x").position[:, 0].tolist() == [1, 2]
+
+
+def test_other_storages_of_ros2_bag(tmp_path: Path) -> None:
+    """Packed as a whole: read. Message by message, or SQLite: refused by name, with what to do."""
+    path = write(tmp_path / "a.mcap", session(20))
+    whole = read_log(path)
+    (tmp_path / "packed").mkdir()
+    packed = tmp_path / "packed" / "a.mcap.zstd"
+    packed.write_bytes(zstandard.compress(path.read_bytes()))
+    log = read_log(packed.parent)
+    assert np.array_equal(log.joint("/road/profile").position, whole.joint("/road/profile").position)
+    packed.write_bytes(packed.read_bytes()[:200])
+    with pytest.raises(InputError):
+        read_log(packed.parent)
+    metadata = tmp_path / "metadata.yaml"
+    metadata.write_text("rosbag2_bagfile_information: {relative_file_paths: [a.mcap], compression_mode: MESSAGE}")
+    with pytest.raises(InputError, match="compressed by itself"):
+        read_log(tmp_path)
+    metadata.write_text("rosbag2_bagfile_information: {relative_file_paths: [a.db3]}")
+    with pytest.raises(InputError, match="SQLite"):
+        read_log(tmp_path)
+    metadata.write_text("rosbag2_bagfile_information: 7")
+    with pytest.raises(InputError, match=r"metadata\.yaml cannot be read"):
+        read_log(tmp_path)
 
 
 def cut(data: bytes) -> bytes:

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+import os
+import pty
+import re
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -18,8 +24,10 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.session import topics
 from pneumo_ros.session.comparison import same_payload
 from pneumo_ros.session.reading import Log, read_log
+from pneumo_ros.session.records import Records
 from pneumo_ros.session.replay import replay
 from pneumo_ros.session.rerun import compare_channels, rerun
+from pneumo_ros.session.rewriting import write_log
 from pneumo_ros.session.transport import SECOND, Transport
 from pneumo_ros.session.what_if import CAVEAT
 
@@ -33,7 +41,8 @@ from pneumo_ros.nodes.base import StopRequest  # noqa: E402
 from pneumo_ros.nodes.controller import ControllerNode  # noqa: E402
 from pneumo_ros.nodes.estimator import EstimatorNode  # noqa: E402
 from pneumo_ros.nodes.plant import PlantNode  # noqa: E402
-from pneumo_ros.nodes.replay import Player, recorded_qos, transport_of  # noqa: E402
+from pneumo_ros.nodes.qos import recorded_qos  # noqa: E402
+from pneumo_ros.nodes.replay import Player, transport_of  # noqa: E402
 from pneumo_ros.nodes.road_profile import RoadProfileNode  # noqa: E402
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode  # noqa: E402
 from pneumo_ros.nodes.spin import make_executor, spin  # noqa: E402
@@ -91,6 +100,31 @@ def test_a_killed_recorders_log_replays_as_far_as_it_goes(recorded: Log, tmp_pat
     result = run(app, [str(path), "--stepped"], env={"COLUMNS": "150"})
     assert result.exit_code == 0, result.output
     assert "going on with the" in result.output and result.output.count(" all ") == 3
+
+
+def test_a_split_bag_replays_like_one_file(recorded: Log, tmp_path: Path) -> None:
+    """As `ros2 bag record --max-bag-duration` leaves it: two files, metadata.yaml, and topics of others."""
+    names = []
+    middle = 2 * SECOND
+    for k, (low, high) in enumerate(((0, middle), (middle, 9 * SECOND))):
+        part = {name: between(recorded.records(name), low, high) for name in recorded.topics}
+        infos = {name: dataclasses.replace(recorded.topics[name], count=len(part[name])) for name in part}
+        names.append(f"bag_{k}.mcap")
+        write_log(dataclasses.replace(recorded, topics=infos, _records=part, _columns={}), tmp_path / names[-1])
+    (tmp_path / "metadata.yaml").write_text(
+        f"rosbag2_bagfile_information: {{version: 9, storage_identifier: mcap, relative_file_paths: {names}}}"
+    )
+    result = replay(read_log(tmp_path))
+    assert len(result.agreements) == 3 and all(a.identical for a in result.agreements)
+
+
+def between(records: Records, low: int, high: int) -> Records:
+    rows = np.flatnonzero((records.log_time_ns >= low) & (records.log_time_ns < high))
+    begin, end = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (0, 0)
+    offsets = records.offsets[begin : end + 1]
+    data = records.data[offsets[0] : offsets[-1]]
+    times = (records.log_time_ns, records.publish_time_ns, records.sequence)
+    return Records(*(t[begin:end] for t in times), offsets - offsets[0], data)
 
 
 def test_other_gains_change_the_command_and_nothing_before_it(recorded: Log, tmp_path: Path) -> None:
@@ -261,3 +295,23 @@ def test_live_replay_feeds_a_running_estimator(recorded: Log, context: Context) 
     finally:
         player.node.destroy_node()
         listener.close()
+
+
+def test_live_replay_from_the_command_line(recorded: Log) -> None:
+    """To the end without a terminal; with one, keys act and `q` ends it."""
+    result = run(app, [str(recorded.path), "--rate", "50", "--domain-id", str(own_domain())])
+    assert result.exit_code == 0, result.output
+    inputs = ("/road/profile", "/rig/displacement", "/rig/front/pressure", "/rig/rear/pressure")
+    published = sum(recorded.topics[name].count for name in inputs)
+    said = re.search(r"(\d+) messages, late by p50", result.output)
+    # The latched configuration counts if it was logged with the first sample, not before it.
+    assert said is not None and int(said[1]) - published in (0, 1), result.output
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "replay", str(recorded.path), "--paused"]
+    process = subprocess.Popen([*command, "--domain-id", str(own_domain())], stdin=theirs, stdout=subprocess.PIPE)
+    assert process.stdout is not None and b"space: pause" in process.stdout.readline()
+    for key in (b".", b"+", b";", b" ", b"q"):
+        os.write(ours, key)
+    assert process.wait(30) == 0
+    os.close(ours)
+    os.close(theirs)

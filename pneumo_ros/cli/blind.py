@@ -42,7 +42,7 @@ def make(
     cases = [case for case in plan(set_name) if only in case.name]
     items = [(case, str(folder)) for case in cases]
     _run("making", make_case, items, [case.name for case in cases], workers, scheduler)
-    _seal(folder, set_name, [case.name for case in cases])
+    seal_set(folder, set_name, [case.name for case in cases])
 
 
 @app.command()
@@ -113,7 +113,7 @@ def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int,
                          remedy="run the same command again: finished cases are kept")  # fmt: skip
 
 
-def _seal(folder: Path, set_name: str, names: Sequence[str]) -> None:
+def seal_set(folder: Path, set_name: str, names: Sequence[str]) -> None:
     """Write manifest.json and labels.json; what is sealed already keeps its seal, new cases are added."""
     from pneumo_ros.twin.plan import plan, seed_of
     from pneumo_ros.twin.seal import sealed

@@ -69,7 +69,7 @@ def replay(
     elif stepped or set_:
         _stepped(found, parse_overrides(set_), output, plot)
     else:
-        from pneumo_ros.nodes.replay import play
+        from pneumo_ros.cli.replay_live import play
 
         play(found, rate, start, paused, loop, everything, domain_id)
 

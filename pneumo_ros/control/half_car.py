@@ -18,6 +18,7 @@ Heave rms falls by 60-71 % against passive on five class D roads with these, by 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from pneumo_ros.control.linearisation import Compensation, Spring, believed_volu
 from pneumo_ros.control.reference_model import advance_reference, reference_jerk
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, load_surface
-from pneumo_ros.plant.half_car import COMMAND_NAMES, HEAVE, PITCH, gas_of
+from pneumo_ros.plant.half_car import COMMAND_NAMES, HEAVE, PITCH, gas_of, unpack_gas
 from pneumo_ros.plant.trim import Trim, trim
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import CUBIC_INCH, INCH, SQUARE_INCH
@@ -151,7 +152,16 @@ class Controller:
         """New state (8,), command (4,) in m2 of COMMAND_NAMES, telemetry (4,) of :data:`TELEMETRY_NAMES`."""
         if self.name == "passive":
             return state, self.at_rest.command, np.zeros(4)
-        return control_half_car(state, estimate, self.law, self.front, self.rear, self.surface)
+        surface = self.surface
+        return control_packed(state, estimate, self.packed, surface.heights, surface.pressures, surface.cubics)
+
+    @cached_property
+    def packed(self) -> NDArray[np.float64]:
+        """Law, front and rear gas in one array: handed over one by one, the numbers cost as much as the control law."""
+        law = self.law
+        nested = [*law.heave, *law.pitch, *law.compensation]
+        flat = [float(getattr(law, name)) for name in Law._fields if name not in ("heave", "pitch", "compensation")]
+        return np.array([*nested, *flat, *self.front, *self.rear])
 
     def with_values(self, values: dict[str, Value], rig: Rig) -> Controller:
         """A copy with changed gains, for live changes; the state goes on."""
@@ -258,3 +268,46 @@ def control_half_car(
         _clip(out_rear, law.outlet_max),
     ])  # fmt: skip
     return new, command, telemetry
+
+
+@njit(cache=True)
+def _unpack_law(p: NDArray[np.float64]) -> Law:
+    """The first 28 numbers of :attr:`Controller.packed`."""
+    return Law(
+        law=int(p[9]),
+        heave=Gains(p[0], p[1], p[2]),
+        pitch=Gains(p[3], p[4], p[5]),
+        reference_pole=p[10],
+        target_heave=p[11],
+        target_pitch=p[12],
+        mass=p[13],
+        inertia=p[14],
+        front_arm=p[15],
+        rear_arm=p[16],
+        outlet_front=p[17],
+        outlet_rear=p[18],
+        inlet_max=p[19],
+        outlet_max=p[20],
+        volume_estimate=p[21],
+        constant_area=p[22],
+        area_floor=p[23],
+        height_error=p[24],
+        compensation=Compensation(p[6], p[7], p[8]),
+        follow_axles=p[25] > 0.5,
+        design_height=p[26],
+        period=p[27],
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def control_packed(
+    state: NDArray[np.float64],
+    x: NDArray[np.float64],
+    packed: NDArray[np.float64],
+    heights: NDArray[np.float64],
+    pressures: NDArray[np.float64],
+    cubics: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """:func:`control_half_car` from packed parameters."""
+    law, front, rear = _unpack_law(packed), unpack_gas(packed, 28), unpack_gas(packed, 42)
+    return control_half_car(state, x, law, front, rear, AreaSurface(heights, pressures, cubics))

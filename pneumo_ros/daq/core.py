@@ -29,6 +29,7 @@ SILENT_FOR = SECOND // 2  # of silence after which the handshake starts again
 WINDOW = SECOND  # over which lost frames are judged
 MIN_WINDOW_FRAMES = 100
 COMPLAINT_EVERY = SECOND  # between events about refused commands
+UNWATCHED = SECOND // 10  # without a tick, after which no command passes: nobody is watching the timeouts
 
 
 class Phase(Enum):
@@ -77,6 +78,7 @@ class DriverCore:
         self._silent = False
         self._window = (0, 0, 0)
         self._last_complaint = -COMPLAINT_EVERY
+        self._last_tick = 0
 
     @property
     def mode(self) -> Mode:
@@ -120,6 +122,7 @@ class DriverCore:
 
     def tick(self, now: int) -> None:
         """Call every 2 ms or so: timeouts, handshakes, keep-alives."""
+        self._last_tick = now
         if self.phase is Phase.RUNNING:
             self._watch_samples(now)
             self._watch_frames(now)
@@ -279,6 +282,8 @@ class DriverCore:
 
     def command(self, areas: Sequence[float], stamp: int, now: int) -> None:
         """A controller's command: m2 in the order of VALVES, computed for the sample of monotonic time ``stamp``."""
+        if self.mode is Mode.ARMED and now - self._last_tick > UNWATCHED:
+            self.fail("its supervision has stopped", now)
         finding = self.actuation.command(areas, stamp, now)
         if finding is None:
             return
@@ -333,8 +338,12 @@ class DriverCore:
             self.actuation.reset_estop(now)
         return why
 
+    def fail(self, why: str, now: int) -> None:
+        """Something in the driver itself broke: valves safe, whatever else still works."""
+        self._make_safe(Finding(Reason.DRIVER_FAILED, "driver", why), now)
+
     def use(self, calibration: Calibration, now: int) -> None:
-        """Take another calibration (zero, span); refused while armed by the caller."""
+        """Take another calibration (zero, span); the caller sees to it that nothing is armed."""
         self.calibration = calibration
         if self.intake is not None:
             self.intake.use(calibration)

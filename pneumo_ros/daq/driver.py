@@ -67,7 +67,7 @@ class SerialDriver:
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._collected: list[Measurement] | None = None
-        self._complained = False
+        self._complained = self._failed = False
 
     # -- life ------------------------------------------------------------------------------------------------------
 
@@ -82,7 +82,7 @@ class SerialDriver:
         self._open_port()
         self._stop.clear()
         self._threads = [
-            threading.Thread(target=target, name=name, daemon=True)
+            threading.Thread(target=self._guarded, args=(target,), name=name, daemon=True)
             for target, name in ((self._read_forever, "daq-reader"), (self._supervise, "daq-supervisor"))
         ]
         for thread in self._threads:
@@ -161,7 +161,23 @@ class SerialDriver:
         """Take another calibration."""
         self._do(lambda now: self.core.use(calibration, now))
 
+    @property
+    def failed(self) -> bool:
+        """Whether one of the driver's threads has ended by an error; it then drives no valve any more."""
+        return self._failed
+
     # -- threads ---------------------------------------------------------------------------------------------------
+
+    def _guarded(self, target: Callable[[], None]) -> None:
+        """Run a thread; if it breaks, the valves are made safe and the driver ends."""
+        try:
+            target()
+        except Exception as error:
+            self._failed = True
+            self._stop.set()
+            text = f"{threading.current_thread().name}: {type(error).__name__}: {error}"
+            self._do(partial(self.core.fail, text))
+            raise
 
     def _do(self, action: Callable[[int], T]) -> T:
         with self._changed:

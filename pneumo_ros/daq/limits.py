@@ -8,6 +8,7 @@ from pneumo_ros.daq.reasons import Finding, Level, Reason
 from pneumo_ros.daq.safety_config import Limit
 
 RATE_FILTER = 0.005  # s, first-order low-pass of the height rates: one noisy count must not look like motion
+WARN_HOLD = 1.0  # s back inside before a warning ends; a quantity that hovers at its limit is one warning, not a flood
 MEASURED = (
     "front_height",
     "rear_height",
@@ -30,6 +31,7 @@ class LimitMonitor:
         """Forget the past: after a gap in the samples."""
         self._outside = [0.0] * len(MEASURED)
         self._warned = [False] * len(MEASURED)
+        self._inside = [0.0] * len(MEASURED)
         self._heights: tuple[float, float] | None = None
         self._rates = [0.0, 0.0]
         self.quantities: tuple[float, ...] = ()
@@ -54,7 +56,8 @@ class LimitMonitor:
     def _judge(self, index: int, quantity: float, limit: Limit, dt: float, found: list[Finding]) -> None:
         name = MEASURED[index]
         inside = limit.warn_low <= quantity <= limit.warn_high
-        if inside == self._warned[index]:
+        self._inside[index] = self._inside[index] + dt if inside else 0.0
+        if (self._inside[index] >= WARN_HOLD) if self._warned[index] else not inside:
             self._warned[index] = not inside
             reason = Reason.LIMIT_CLEAR if inside else Reason.LIMIT_WARN
             text = f"{name} {quantity:.4g}, warning limits {limit.warn_low:.4g} to {limit.warn_high:.4g}"

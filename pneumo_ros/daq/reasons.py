@@ -28,6 +28,7 @@ class Reason(Enum):
     CALIBRATION_DOUBTFUL = "the calibration has findings"
     CALIBRATION_CHANGED = "zero or span was set"
     CHANNEL_UNWATCHED = "the sensor's noise is too small against one count to tell a stuck sensor in time"
+    DRIVER_FAILED = "the driver itself has failed"
     ARMED = "the valves follow the controller"
     ARM_REFUSED = "the board did not arm"
     DISARMED = "disarmed by the operator"

@@ -27,8 +27,7 @@ class Effort:
     ----------
     singles : singles that get a short fit
     finalists : singles fitted to convergence
-    leaders : finalists on top of which a second effect is sought
-    seconds : second effects tried on each leader
+    seconds : second effects tried on the first, second, ... leader
     blind_pairs : pairs taken from the screening at the refit
     pair_finalists : pairs fitted to convergence
     short, long : iterations of a short and of a full fit
@@ -36,8 +35,7 @@ class Effort:
 
     singles: int = 14
     finalists: int = 6
-    leaders: int = 3
-    seconds: int = 4
+    seconds: tuple[int, ...] = (7, 4, 3)
     blind_pairs: int = 4
     pair_finalists: int = 4
     short: int = 3
@@ -110,7 +108,7 @@ def _run_singles(contest: Contest) -> None:
     contest.progress(0.05, "screening effects")
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
-    short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles), (0.1, 0.4))
+    short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles, 3), (0.1, 0.4))
     ended = [_finish(problem, one, effort) for one in short[: effort.finalists]]
     contest.singles = _by_cost(ended) + short[effort.finalists :]
 
@@ -121,18 +119,18 @@ def _run_pairs(contest: Contest) -> None:
     seen: set[frozenset[Part]] = set()
 
     def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
-        fresh = [p for p in promised if frozenset((*base, *p.parts)) not in seen][:count]
+        fresh = _varied([p for p in promised if frozenset((*base, *p.parts)) not in seen], count, 2)
         seen.update(frozenset((*base, *p.parts)) for p in fresh)
         return fresh
 
     short: list[Fit] = []
-    for k, single in enumerate(contest.singles[: effort.leaders]):
+    for k, (single, count) in enumerate(zip(contest.singles, effort.seconds, strict=False)):
         leader = with_jacobian(problem, single)
         part = leader.candidate.parts[0]
         others = [p for p in all_parts(problem) if compatible((part, p))]
         promised = promises(problem, leader, trials(problem, leader, others))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
-        short += _short_fits(contest, leader, unseen(promised, (part,), effort.seconds), span)
+        short += _short_fits(contest, leader, unseen(promised, (part,), count), span)
     found = trials(problem, contest.refit, all_parts(problem))
     blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
     short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
@@ -140,15 +138,18 @@ def _run_pairs(contest: Contest) -> None:
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
 
 
-def _varied(promised: Sequence[Promise], count: int) -> list[Promise]:
-    """The most promising, but not more than three sites of one effect, so that rivals of another kind get their
+def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
+    """The most promising, but not more than a few sites of one effect, so that rivals of another kind get their
     chance.
     """
     taken: list[Promise] = []
     for promise in promised:
-        if sum(p.parts[0][0] == promise.parts[0][0] for p in taken) < 3:
+        kind = [effect for effect, _ in promise.parts]
+        if sum([effect for effect, _ in p.parts] == kind for p in taken) < sites:
             taken.append(promise)
-    return taken[:count]
+        if len(taken) == count:
+            break
+    return taken
 
 
 def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:

@@ -178,6 +178,7 @@ def _report(
         edit=None if edit is None else edit_test(problem, edit, base, best),
         notes=tuple(notes),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
+        tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
         evidence=_evidence(refit, opinion.chosen, runs, before, after),
         trajectories=_trajectories(holdout, runs),
     )
@@ -212,9 +213,10 @@ def _ranking(
     holdout: Any,
 ) -> list[Ranked]:
     refit = runs["refit"]
-    out = [_plain(("none",), opinion.named[Candidate()], refit.total)]
+    fitted = problem.gap(base.residual)
+    out = [_plain(("none",), opinion.named[Candidate()], refit.total, fitted)]
     if opinion.unknown > 1e-3:
-        out.append(_plain(("unknown",), opinion.unknown, refit.total))
+        out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
     for scored in finalists:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else with_jacobian(problem, scored.fit)
@@ -223,8 +225,8 @@ def _ranking(
     return sorted(out, key=lambda r: -r.probability)
 
 
-def _plain(effects: tuple[str, ...], probability: float, gap: float) -> Ranked:
-    return Ranked(effects, (), None, probability, {}, gap, 0.0, (0.0, 0.0))
+def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: float) -> Ranked:
+    return Ranked(effects, (), None, probability, {}, gap, 0.0, (0.0, 0.0), fitted)
 
 
 def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Any) -> Ranked:
@@ -243,6 +245,7 @@ def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit:
         gap_after=run.total,
         shrink=1.0 - run.total / refit.total,
         shrink_ci90=bootstrap_shrink(holdout, refit.predicted, run.predicted),
+        gap_fit=problem.gap(one.residual),
         notes=tuple(notes),
     )
 

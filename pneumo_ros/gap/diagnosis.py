@@ -53,6 +53,7 @@ class Ranked:
     gap_after : held-out gap with it
     shrink : 1 - gap_after / gap of the refit
     shrink_ci90 : moving-block bootstrap
+    gap_fit : gap on the fitted logs
     notes : what counts against it
     """
 
@@ -64,6 +65,7 @@ class Ranked:
     gap_after: float
     shrink: float
     shrink_ci90: tuple[float, float]
+    gap_fit: float = math.nan
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -77,6 +79,7 @@ class Ranked:
             "gap_after": self.gap_after,
             "shrink": self.shrink,
             "shrink_ci90": list(self.shrink_ci90),
+            "gap_fit": self.gap_fit,
             "notes": list(self.notes),
         }
 
@@ -177,6 +180,7 @@ class Diagnosis:
     active : the chosen effects with their values
     not_testable : effects that this excitation could not have shown, with the smallest size it could
     notes : sentences for the reader: limitations, bounds reached, divergences
+    tried : label and gap on the fitted logs of every candidate that was fitted, best first
     evidence : numbers the verdict rests on
     trajectories : on the held-out rows: "time" (N,), "log", "nominal", "refit", "best" (N, C)
     """
@@ -194,6 +198,7 @@ class Diagnosis:
     edit: EditTest | None = None
     notes: tuple[str, ...] = ()
     logs: Mapping[str, Any] = field(default_factory=dict)
+    tried: tuple[tuple[str, float], ...] = ()
     evidence: Mapping[str, float] = field(default_factory=dict)
     trajectories: Mapping[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
@@ -212,6 +217,7 @@ class Diagnosis:
             "next_experiment": None if self.experiment is None else self.experiment.to_json(),
             "edit_test": None if self.edit is None else self.edit.to_json(),
             "notes": list(self.notes),
+            "tried": [{"candidate": label, "gap_fit": gap} for label, gap in self.tried],
             "evidence": dict(self.evidence),
             "logs": dict(self.logs),
         }

@@ -21,7 +21,7 @@ from pneumo_ros.gap.problem import Candidate, Problem
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
 HUBER = 4.0  # robust sigmas
 STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
-CENTRAL = 0.05  # half width of the central differences
+CENTRAL = 2e-3  # half width of the central differences
 TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
 NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
 COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data

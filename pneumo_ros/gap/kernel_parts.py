@@ -33,7 +33,8 @@ class Strut(NamedTuple):
 
 class Air(NamedTuple):
     """The gas of one spring: pressure Pa absolute, height m, height rate m/s, volume m3, temperature K (Eq. 4.17),
-    inflow and outflow kg/s, exponent n, supply (stagnation) temperature K."""
+    inflow and outflow kg/s, exponent n, supply (stagnation) temperature K, and the flow that an ideal opening to the
+    atmosphere would let out, kg/s per m2."""
 
     pressure: float
     height: float
@@ -44,6 +45,7 @@ class Air(NamedTuple):
     outflow: float
     exponent: float
     supply_temperature: float
+    escape: float
 
 
 class Tyre(NamedTuple):
@@ -79,6 +81,7 @@ def air_of(
     power = pressure_power(pressure, gas)
     psi = clamped_flow_function(pressure / supply, power * supply_power, gas.k, gas.critical, gas.choked)
     inflow = gas.inlet_scale * inlet * supply * psi / math.sqrt(GAS_CONSTANT * gas.supply_temperature)
+    escape = outlet_flow(1.0, pressure, power, gas) / gas.outlet_scale
     return Air(
         pressure,
         height,
@@ -86,9 +89,10 @@ def air_of(
         gas.volume_offset + gas.mean_area * height,
         gas.supply_temperature * power,
         inflow,
-        outlet_flow(outlet, pressure, power, gas),
+        gas.outlet_scale * outlet * escape,
         gas.exponent,
         gas.supply_temperature,
+        escape,
     )
 
 

@@ -145,6 +145,13 @@ class Problem:
             out.append(average(self.model.predict(record, nuisance, initial, active), self.averaged))
         return np.vstack(out)
 
+    def gap(self, residual: Array) -> float:
+        """Normalised gap on the fitted logs (averaged samples) of a residual in sigmas."""
+        sigma = np.where(self.weight > 0.0, 1.0 / np.maximum(self.weight, 1e-300), 0.0)
+        scale = np.mean([scale_of(r) for r in self.records], axis=0)
+        there = np.maximum((self.weight > 0.0).sum(axis=0), 1)
+        return float(np.sqrt(np.mean(np.sum((residual * sigma / scale) ** 2, axis=0) / there)))
+
     @cached_property
     def coarse_records(self) -> tuple[Any, ...] | None:
         """The logs at half the rate, if the model knows how: good enough for sensitivities at half the cost."""

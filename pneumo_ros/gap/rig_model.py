@@ -39,11 +39,11 @@ SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
 # is no effect.
 COMMAND_DELAY = "command_delay"
 COMMAND_DELAY_STD = 4e-4  # s
+SLOPE_SHARE = 0.5  # of the volume scale's tolerance, for the slope of V(h) about the design height
 _NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
-# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. The volume's
-# level and its slope over height are known equally well, and not by the same measurement: both are free (a common
-# factor would leave V/(dV/dh), hence the air's stiffness, exact).
+# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. Beside them
+# the slope of V(h) has a tolerance of its own: a common factor alone would make V/(dV/dh), the air's stiffness, exact.
 NUISANCE = {
     "sprung_mass": "sprung_mass",
     "pitch_inertia": "pitch_inertia",
@@ -60,8 +60,6 @@ NUISANCE = {
     "effective_area_scale_rear": "effective_area_scale",
     "volume_scale_front": "volume_scale",
     "volume_scale_rear": "volume_scale",
-    "volume_slope_scale_front": "volume_scale",
-    "volume_slope_scale_rear": "volume_scale",
     "discharge_coefficient_front": "discharge_coefficient",
     "discharge_coefficient_rear": "discharge_coefficient",
 }
@@ -95,6 +93,8 @@ class RigModel:
             q = getattr(self.rig, source)
             if q.std > 0.0:
                 found.append(Parameter(name, q.unit, q.value, q.std))
+        slope = SLOPE_SHARE * self.rig.volume_scale.std
+        found += [Parameter(f"volume_slope_{end}", "1", 1.0, slope) for end in ("front", "rear") if slope > 0.0]
         found.append(Parameter(COMMAND_DELAY, "s", 0.0, COMMAND_DELAY_STD))
         return tuple(found)
 
@@ -289,7 +289,7 @@ def _plant(rig: Rig, base: HalfCar, v: Mapping[str, float]) -> Plant:
 
 def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
     volume = v.get(f"volume_scale_{end}", rig.volume_scale.value)
-    slope = v.get(f"volume_slope_scale_{end}", rig.volume_scale.value)
+    slope = volume * v.get(f"volume_slope_{end}", 1.0)
     level = VOLUME_OFFSET + MEAN_AREA * rig.design_height.value
     coefficient = v.get(f"discharge_coefficient_{end}", rig.discharge_coefficient.value)
     supply = v.get("supply_pressure", gas.supply_pressure)

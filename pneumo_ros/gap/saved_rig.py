@@ -22,7 +22,7 @@ def corrected_rig(found: Diagnosis, model: RigModel) -> Rig:
     """The model's rig with its estimated parameters."""
     values: dict[str, list[float]] = {}
     for name, quantity in NUISANCE.items():
-        if name in found.nuisance and name not in ("volume_slope_scale_front", "volume_slope_scale_rear"):
+        if name in found.nuisance:
             values.setdefault(quantity, []).append(found.nuisance[name].value)
     means = {quantity: float(np.mean(numbers)) for quantity, numbers in values.items()}
     means |= _folded(found, model.rig, means)

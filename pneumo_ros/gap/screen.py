@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations, product, zip_longest
 
 import numpy as np
 
@@ -82,8 +82,23 @@ def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
 
 
 def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[Promise]:
-    """Singles (or pairs) of the trials, the most promising first, one entry for each part (or pair of parts)."""
-    gram, with_residual, total = _projected(problem, base, found)
+    """Singles (or pairs) of the trials, the most promising first, one entry for each part (or pair of parts).
+
+    Judged twice, and merged in turn: once with the unknowns that stand at a bound held there, once with them free,
+    because the right effect is what lets them come back from it.
+    """
+    held = _promises(problem, base, found, pairs, held=True)
+    free = _promises(problem, base, found, pairs, held=False)
+    merged: dict[tuple[Part, ...], Promise] = {}
+    for couple in zip_longest(held, free):
+        for one in couple:
+            if one is not None:
+                merged.setdefault(one.parts, one)
+    return list(merged.values())
+
+
+def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool) -> list[Promise]:
+    gram, with_residual, total = _projected(problem, base, found, held)
     best: dict[tuple[Part, ...], Promise] = {}
     for members in combinations(range(len(found)), 2) if pairs else product(range(len(found))):
         parts = tuple(found[m].part for m in members)
@@ -123,7 +138,7 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
     )
 
 
-def _projected(problem: Problem, base: Fit, found: Sequence[Trial]) -> tuple[Array, Array, float]:
+def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
     """Gram matrix of the changes and their products with the residual, both free of what the base's unknowns can do."""
     assert base.jacobian is not None
     rows = problem.fitted
@@ -134,7 +149,9 @@ def _projected(problem: Problem, base: Fit, found: Sequence[Trial]) -> tuple[Arr
     mean = float(np.mean(weighted**2))
     strength = 1.0 / (CORRELATION * (COST_FLOOR + mean))
     low, high = problem.bounds(base.candidate)
-    free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
+    free = np.ones(len(base.x), dtype=bool)
+    if held:
+        free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
     J = (base.jacobian[rows][:, :, free] * root[:, :, None]).reshape(weighted.size, -1)
     prior = np.where(np.arange(len(base.x)) < problem.fixed, 1.0, 1e-9)[free]
     solve = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))

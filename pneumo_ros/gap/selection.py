@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pneumo_ros.gap.fit import COST_FLOOR, Fit
+from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 
+FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
 TOLL = 4.0  # of the cost, for each parameter
 SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
 
@@ -28,16 +29,19 @@ class Thresholds:
     ----------
     first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
     first_cost, second_cost : fall of the training cost that it must bring
+    relief : fall of the prior's share of the cost that is evidence by itself: a structure that needs no stretched
+        tolerances, where the poorer one does
     least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
     """
 
-    first: float = 0.12
-    second: float = 0.2
+    first: float = 0.3
+    second: float = 0.3
     first_cost: float = 15.0
     second_cost: float = 20.0
     least: float = 0.3
+    relief: float = 15.0
     model_form: float = 0.03
 
 
@@ -50,11 +54,13 @@ class Scored:
     fit : the candidate
     level : mean square, sigmas
     blocks : (B,) mean square of each selection block
+    stretch : sum of squares of the nuisance parameters, in prior sigmas
     """
 
     fit: Fit
     level: float
     blocks: Array
+    stretch: float
 
     @property
     def size(self) -> int:
@@ -71,12 +77,12 @@ def score(problem: Problem, fit: Fit) -> Scored:
         rows = problem.block == number
         blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
     values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
-    return Scored(fit, float(np.mean(values)), values)
+    return Scored(fit, float(np.mean(values)), values, float(np.sum(fit.x[: len(problem.model.parameters)] ** 2)))
 
 
 def advantage(poorer: Scored, richer: Scored) -> float:
     """Fall of log mean square from the poorer to the richer structure."""
-    return float(np.log((COST_FLOOR + poorer.level) / (COST_FLOOR + richer.level)))
+    return float(np.log((FORM + poorer.level) / (FORM + richer.level)))
 
 
 def standard_error(one: Scored, other: Scored) -> float:
@@ -97,7 +103,9 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         best = _simplest(rivals)
         poorer = chosen
         fallen = poorer.level - best.level
-        evidence = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
+        better = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
+        relieved = poorer.stretch - best.stretch > limits.relief and advantage(poorer, best) > -0.1
+        evidence = better or (size == 1 and relieved)
         beyond_form = fallen > limits.model_form**2 * refit.level
         if evidence and (size == 1 or beyond_form):
             chosen = best

@@ -10,21 +10,27 @@ from pneumo_ros.gap.model import Array, Mask
 from pneumo_ros.gap.problem import Problem
 
 LONGEST = 60  # fit samples over which the residual's correlation is summed
+TRUE_TO = 2e-3
+LAW = 0.015  # of an effect's value: another law of the same kind puts its parameter that far off
 NOTHING = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by
 
 
 def covariance(problem: Problem, fit: Fit) -> Array:
     """Covariance of the scaled unknowns: curvature of the data over the residual's own size and correlation, and prior.
 
-    An unknown at its bound does not vary.
+    An unknown at its bound does not vary. Sensitivities are true to :data:`TRUE_TO` of themselves: a direction that
+    moves the outputs by less than that tells nothing, and only the prior holds it.
     """
     assert fit.jacobian is not None
     free = _free(problem, fit)
     J = fit.jacobian[:, :, free].reshape(-1, int(free.sum()))
     prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)[free]
     strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
+    size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
+    values, vectors = np.linalg.eigh((J / size).T @ (J / size))
+    known = (vectors * np.maximum(values - len(size) * TRUE_TO**2, 0.0)) @ vectors.T * np.outer(size, size)
     out = np.zeros((len(fit.x), len(fit.x)))
-    out[np.ix_(free, free)] = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))
+    out[np.ix_(free, free)] = np.linalg.inv(strength * known + np.diag(prior))
     return out
 
 
@@ -55,13 +61,14 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
     out = {}
     for k, (p, owner) in enumerate(zip(parameters, owners, strict=True)):
         m = problem.fixed + k
+        value = float(fit.x[m] * p.typical)
         moved = float(np.sqrt(np.mean(fit.jacobian[:, :, m] ** 2)))
         name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
         while name in out:
             name += "_2"
         at_bound = not free[m] and not (p.size and p.low == 0.0 and fit.x[m] == 0.0)
         out[name] = Estimate(
-            float(fit.x[m] * p.typical), float(np.sqrt(cov[m, m]) * p.typical), p.unit, at_bound, moved < NOTHING
+            value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
         )
     return out
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneumo_ros.gap.problem import Candidate
-from pneumo_ros.gap.selection import Scored, Thresholds
+from pneumo_ros.gap.selection import FORM, Scored, Thresholds
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Calibration:
     """
 
     sharpness: float = 12.0
-    leftover: float = 0.12
+    leftover: float = 0.18
     steepness: float = 4.0
     floor: float = 1.0
     real: float = 2.5
@@ -81,15 +81,17 @@ def judge(
 def _named(
     refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
 ) -> dict[Candidate, float]:
-    """Softmax of scores; each further effect pays what chance would give it, and more where laws are only similar."""
-    tolerances = len(refit.fit.x)
+    """Softmax of scores; each further effect pays what chance would give it, its many rivals share one chance, and
+    differences within what laws of the right kind leave count less."""
     form = limits.model_form**2 * refit.level
 
+    count = {size: sum(f.size == size for f in finalists) for size in (0, 1, 2)}
+
     def height(s: Scored) -> float:
-        level = np.log(calibration.floor * 0.3 + form + s.level)
+        level = np.log(FORM + form + s.level)
         toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
-        stretched = 0.5 * float(np.sum(s.fit.x[:tolerances] ** 2))
-        return float(-calibration.sharpness * (level + toll) - stretched)
+        toll += np.log(max(1, count[s.size])) / calibration.sharpness
+        return float(-calibration.sharpness * (level + toll) - 0.5 * s.stretch)
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())

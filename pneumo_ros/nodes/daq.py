@@ -7,7 +7,6 @@ a session) activates. Nothing here decides about safety: the driver does, and th
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
 
@@ -16,7 +15,6 @@ from rclpy.executors import Executor
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from std_msgs.msg import String
 
-from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.daq.calibration import DEFAULT
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import Phase
@@ -28,6 +26,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.base import ERROR, OK, WARN, RigNode
 from pneumo_ros.nodes.daq_output import MeasurementOutput, WallClock
 from pneumo_ros.nodes.daq_services import RigServices
+from pneumo_ros.nodes.daq_session import SessionCourse
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
@@ -52,14 +51,18 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("calibration_output", "", "", "file (YAML) that zero and span write; empty for none"),
 )  # fmt: skip
 HANDSHAKE_PATIENCE = 3.0  # s for the board's answer when configuring
-LOOK_PERIOD = 0.01  # s between looks at the driver's mode
-PROGRESS_PERIOD = 0.2  # s between progress lines
 LEVELS = {Level.OK: OK, Level.WARN: WARN, Level.ERROR: ERROR}
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
 class DaqNode(LifecycleNodeMixin, RigNode):
-    """Thin shell over :class:`pneumo_ros.daq.driver.SerialDriver`."""
+    """Thin shell over :class:`pneumo_ros.daq.driver.SerialDriver`.
+
+    Attributes
+    ----------
+    driver : None while unconfigured
+    reason : why the last transition was refused
+    """
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         RigNode.__init__(self, "daq", PARAMETERS, context=context, overrides=overrides)
@@ -76,12 +79,9 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
         self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
         self.subscribe(topics.COMMAND, self._on_command)
-        self._others_ready: set[str] = set()
-        self.create_subscription(String, topics.READY.name, self._on_ready_message, self.ready_qos())
-        self._start_asked = self._end = self._next_progress = 0.0
-        self._first_ns = 0
+        self.reason = ""
         LifecycleNodeMixin.__init__(self)
-        self.create_timer(LOOK_PERIOD, self._look)
+        self.course = SessionCourse(self)
 
     @property
     def state_label(self) -> str:
@@ -145,59 +145,6 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.event(ERROR, code, why)
         self.reason = why
         return FAILURE
-
-    # -- session ---------------------------------------------------------------------------------------------------
-
-    def _on_ready_message(self, message: String) -> None:
-        self._others_ready.add(message.data)
-        wanted = set(str(self.values["session_nodes"]).split(","))
-        if not self._start_asked and self.values["autostart"] and wanted <= self._others_ready:
-            self._start_asked = time.monotonic()
-
-    def _look(self) -> None:
-        """Autostart, trips, progress, the end; in the executor's thread, where transitions belong."""
-        state = self.state_label
-        if self.stop.set:
-            return
-        if self._start_asked and not self._first_ns:
-            self._start(state)
-        elif state == "active" and self.driver is not None and self.driver.core.mode is not Mode.ARMED:
-            self.trigger_deactivate()
-        if self._first_ns:
-            self._progress((time.monotonic_ns() - self._first_ns) * 1e-9)
-
-    def _start(self, state: str) -> None:
-        if state == "unconfigured" and self.trigger_configure() is not SUCCESS:
-            self._give_up(self.reason)
-        elif state == "inactive" and self.driver is not None:
-            why = self.driver.core.blockers(time.monotonic_ns())
-            if not why and self.trigger_activate() is SUCCESS:
-                self._first_ns = time.monotonic_ns()
-                self.event(OK, "session_started", "valves armed", {"start_ns": str(self.wall.ros(self._first_ns))})
-            elif time.monotonic() - self._start_asked > self.values["arm_patience"]:
-                self._give_up(f"cannot arm: {'; '.join(why) or self.reason}")
-
-    def _give_up(self, why: str) -> None:
-        print(f"error: {why}", file=sys.stderr, flush=True)
-        self.event(ERROR, "session_not_started", why)
-        self.exit_code, self.stop.set = 2, True
-
-    def _progress(self, elapsed: float) -> None:
-        if self.values["report_progress"] and elapsed >= self._next_progress:
-            self._next_progress = elapsed + PROGRESS_PERIOD
-            print(f"PROGRESS {elapsed:.3f}", flush=True)
-        if 0.0 < self.values["duration"] <= elapsed:
-            self._finish()
-
-    def _finish(self) -> None:
-        trip = self.driver.core.trip if self.driver is not None else None
-        if self.state_label == "active":
-            self.trigger_deactivate()
-        elif trip is not None:
-            print(f"valves were made safe {(trip.time_ns - self._first_ns) * 1e-9:.3f} s after arming: {trip.message}")
-            self.exit_code = 1
-        self.event(OK, "session_complete", "the session's duration has passed")
-        self.stop.set = True
 
     def on_stop(self, executor: Executor) -> None:
         """Valves safe and port closed before the last messages are delivered."""

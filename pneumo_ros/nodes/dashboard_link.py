@@ -8,10 +8,8 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from numpy.typing import NDArray
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rclpy.context import Context
 from rclpy.node import Node
@@ -33,50 +31,17 @@ from pneumo_ros.rig import Rig, load_rig, parse_rig
 from pneumo_ros.session import topics
 from pneumo_ros.session.cdr import JointDecoder, decode_pressure
 from pneumo_ros.session.dashboard.panels import SHOWN, Samples
+from pneumo_ros.session.dashboard.ring import Ring
 from pneumo_ros.session.dashboard.source import Control, Status
 from pneumo_ros.session.inspection import Event
 
 NODE_NAME = "dashboard"
-CAPACITY = 60_000  # samples a topic: 30 s at 2 kHz, 2 min at 500 Hz
 QUIET = 1.5  # s without a sample after which the session is taken to be over or not there
 TUNABLE = ("controller", "estimator")
 LOOK_PERIOD = 1.0  # s between looks for the parameters of a node that has not answered yet
 _ENDING = ("session_complete", "session_stopped", "node_died")
 _DEPTH = 50
 _NUMBERS = {ParameterType.PARAMETER_DOUBLE, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_BOOL}
-
-
-class Ring:
-    """The last samples of one topic. One thread appends, others read."""
-
-    def __init__(self, names: Sequence[str], capacity: int = CAPACITY) -> None:
-        self.names = tuple(names)
-        self._time = np.zeros(capacity, np.int64)
-        self._values = np.zeros((capacity, len(self.names)))
-        self._count = 0
-        self._lock = threading.Lock()
-
-    def append(self, time_ns: int, values: Sequence[float]) -> None:
-        """Add one; a stamp that goes back starts a new session."""
-        with self._lock:
-            if self._count and time_ns < self._time[(self._count - 1) % len(self._time)]:
-                self._count = 0
-            row = self._count % len(self._time)
-            self._time[row], self._values[row] = time_ns, values
-            self._count += 1
-
-    def since(self, begin_ns: int) -> Samples:
-        """Those with stamps from ``begin_ns`` on."""
-        with self._lock:
-            order = self._order()
-            time, values = self._time[order], self._values[order]
-        return Samples(time, self.names, values).between(begin_ns, np.iinfo(np.int64).max - 1)
-
-    def _order(self) -> NDArray[np.int64]:
-        size = len(self._time)
-        if self._count <= size:
-            return np.arange(self._count)
-        return np.roll(np.arange(size), -(self._count % size))
 
 
 class LiveLink:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import yaml
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from pneumo_ros.session.topics import Flow
+from pneumo_ros.session.topics import BY_NAME, Flow
 
 RECORDER_DEPTH = 500  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
 
@@ -62,3 +63,25 @@ def rosbag2_qos(profile: QoSProfile) -> dict[str, object]:
         "liveliness_lease_duration": span(profile.liveliness_lease_duration),
         "avoid_ros_namespace_conventions": profile.avoid_ros_namespace_conventions,
     }
+
+
+def recorded_qos(name: str, text: str) -> QoSProfile:
+    """The QoS a topic was offered with, from the recorder's note; the table's where there is none."""
+    known = BY_NAME.get(name)
+    profile = publisher_qos(known.flow, lockstep=True) if known else QoSProfile(depth=100)
+    try:
+        offered = yaml.safe_load(text) or []
+    except yaml.YAMLError:
+        offered = []
+    if not isinstance(offered, list) or not offered or not isinstance(offered[0], dict):
+        return profile
+    # rosbag2 writes words since Iron and the numbers of rmw's enumerations before.
+    if str(offered[0].get("reliability")) in ("best_effort", "2"):
+        profile.reliability = ReliabilityPolicy.BEST_EFFORT
+    elif str(offered[0].get("reliability")) in ("reliable", "1"):
+        profile.reliability = ReliabilityPolicy.RELIABLE
+    if str(offered[0].get("durability")) in ("transient_local", "1"):
+        profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+    elif str(offered[0].get("durability")) in ("volatile", "2"):
+        profile.durability = DurabilityPolicy.VOLATILE
+    return profile

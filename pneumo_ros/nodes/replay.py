@@ -3,19 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import select
-import sys
-import termios
 import threading
 import time
-import tty
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import rclpy
-import yaml
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
@@ -24,15 +17,13 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
-from rich.console import Console
+from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
-from pneumo_ros.nodes.qos import publisher_qos
-from pneumo_ros.nodes.spin import SPIN_TIMEOUT, SignalStop
+from pneumo_ros.nodes.qos import recorded_qos
+from pneumo_ros.nodes.spin import SPIN_TIMEOUT
 from pneumo_ros.session import topics
 from pneumo_ros.session.cdr import encode_clock
 from pneumo_ros.session.reading import Log
@@ -45,8 +36,6 @@ INPUTS = (
 CLOCK_PERIOD = 10_000_000  # ns of wall time between /clock messages: 100 Hz, as Gazebo does
 ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 IDLE = 0.01  # s between looks while nothing is due
-DISCOVERY = 1.0  # s for subscribers to find the publishers before the first message
-KEYS = "space: pause/go on   . : one sample   , / ; : 1 s back/ahead   + - : faster/slower   q: end"
 
 
 @dataclass(frozen=True)
@@ -212,28 +201,6 @@ class Player:
         made.publish(self._log.records(self._names[which]).message(int(self._tape.row[i])))
 
 
-def recorded_qos(name: str, text: str) -> QoSProfile:
-    """The QoS a topic was offered with, from the recorder's note; the table's where there is none."""
-    known = topics.BY_NAME.get(name)
-    profile = publisher_qos(known.flow, lockstep=True) if known else QoSProfile(depth=100)
-    try:
-        offered = yaml.safe_load(text) or []
-    except yaml.YAMLError:
-        offered = []
-    if not isinstance(offered, list) or not offered or not isinstance(offered[0], dict):
-        return profile
-    # rosbag2 writes words since Iron and the numbers of rmw's enumerations before.
-    if str(offered[0].get("reliability")) in ("best_effort", "2"):
-        profile.reliability = ReliabilityPolicy.BEST_EFFORT
-    elif str(offered[0].get("reliability")) in ("reliable", "1"):
-        profile.reliability = ReliabilityPolicy.RELIABLE
-    if str(offered[0].get("durability")) in ("transient_local", "1"):
-        profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
-    elif str(offered[0].get("durability")) in ("volatile", "2"):
-        profile.durability = DurabilityPolicy.VOLATILE
-    return profile
-
-
 def transport_of(log: Log, rate: float = 1.0, loop: bool = False, paused: bool = False) -> Transport:
     """A transport over the log's periodic topics: what was latched before the first sample does not stretch it.
 
@@ -268,78 +235,3 @@ def spinning(node: Node, context: Context) -> Iterator[None]:
         running = False
         thread.join()
         executor.shutdown()
-
-
-def play(
-    log: Log, rate: float, start: float, paused: bool, loop: bool, everything: bool, domain_id: int | None
-) -> None:
-    """Play a log to its end, or until stopped; says at the end how punctual it was."""
-    console = Console(highlight=False, soft_wrap=True)
-    stop = SignalStop()
-    context = Context()
-    rclpy.init(context=context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
-    player = Player(log, transport_of(log, rate, loop, paused), everything, context)
-    for note in player.notes:
-        console.print(f"[cyan]note[/] {note}")
-    try:
-        with spinning(player.node, context), _keyboard() as keys:
-            console.print(f"replaying {log.path.name} at {rate:g} x" + (f"   {KEYS}" if keys is not None else ""))
-            _wait_for_subscribers(player)
-            player.seek(start)
-            while not stop.set and not player.transport.finished(time.monotonic_ns()):
-                pause = player.advance()
-                if keys is not None and _on_key(player, keys):
-                    break
-                time.sleep(pause)
-            player.advance()
-            player.flush()
-    finally:
-        player.node.destroy_node()
-        rclpy.try_shutdown(context=context)
-    console.print(describe_lateness(player.lateness))
-
-
-def describe_lateness(lateness: Sequence[int]) -> str:
-    """How punctual the messages were."""
-    if not lateness:
-        return "nothing was published"
-    p50, p99 = np.percentile(lateness, [50, 99]) * 1e-6
-    return f"{len(lateness)} messages, late by p50 {p50:.3f} ms, p99 {p99:.3f} ms, max {max(lateness) * 1e-6:.3f} ms"
-
-
-def _wait_for_subscribers(player: Player) -> None:
-    """Give discovery its time, as a publisher that speaks at once is not heard."""
-    end = time.monotonic() + DISCOVERY
-    while time.monotonic() < end:
-        time.sleep(IDLE)
-
-
-@contextlib.contextmanager
-def _keyboard() -> Iterator[Any]:
-    """Single key presses where there is a terminal, else None."""
-    if not sys.stdin.isatty():
-        yield None
-        return
-    before = termios.tcgetattr(sys.stdin)
-    try:
-        tty.setcbreak(sys.stdin)
-        yield sys.stdin
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
-
-
-def _on_key(player: Player, keys: Any) -> bool:
-    """Act on a pressed key; True to end."""
-    if not select.select([keys], [], [], 0)[0]:
-        return False
-    key, transport = keys.read(1), player.transport
-    wall = time.monotonic_ns()
-    if key == " ":
-        transport.pause(wall, not transport.paused)
-    elif key == ".":
-        player.step()
-    elif key in ",;":
-        player.seek(player.position + (1.0 if key == ";" else -1.0))
-    elif key in "+-":
-        transport.set_rate(wall, transport.rate * (2.0 if key == "+" else 0.5))
-    return bool(key == "q")

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area
-from pneumo_ros.plant.half_car import Body, HalfCar, derivative
+from pneumo_ros.plant.air_spring import AreaSurface, effective_area
+from pneumo_ros.plant.half_car import HalfCar, derivative, unpack_body, unpack_gas
 from pneumo_ros.rig import Rig
 
 CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
@@ -39,9 +39,16 @@ class NoiseSource:
 
 @njit(cache=True, error_model="numpy")
 def _truth(
-    x: NDArray[np.float64], u: NDArray[np.float64], road: NDArray[np.float64], body: Body, front: Gas, rear: Gas,
-    surface: AreaSurface,
-) -> NDArray[np.float64]:  # fmt: skip
+    x: NDArray[np.float64],
+    u: NDArray[np.float64],
+    road: NDArray[np.float64],
+    packed: NDArray[np.float64],
+    heights: NDArray[np.float64],
+    pressures: NDArray[np.float64],
+    cubics: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    surface = AreaSurface(heights, pressures, cubics)
+    body, front, rear = unpack_body(packed), unpack_gas(packed, 14), unpack_gas(packed, 28)
     state = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9])
     rates = derivative(state, u[0], u[1], u[2], u[3], road[0], road[1], body, front, rear, surface)
     out = np.empty(16)
@@ -66,4 +73,5 @@ def truth(
     command : (4,) m2
     road : (2,) m
     """
-    return _truth(state, command, road, car.body, car.front, car.rear, car.surface)
+    surface = car.surface
+    return _truth(state, command, road, car.packed, surface.heights, surface.pressures, surface.cubics)

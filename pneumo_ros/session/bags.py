@@ -43,26 +43,40 @@ def files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     listed = _listed(path)
-    files = [path / name for name in listed] if listed else sorted(path.glob("*.mcap"))
+    files = [path / name for name in listed] if listed else sorted([*path.glob("*.mcap"), *path.glob("*.mcap.zstd")])
     if not files:
         raise InputError("the folder holds no .mcap file", where=path, remedy="give the folder that ros2 bag wrote")
-    missing = [file for file in files if not file.exists()]
-    if missing:
-        raise InputError(f"metadata.yaml lists {missing[0].name}, which is not there", where=path)
+    for file in files:
+        if file.suffix == ".db3":
+            raise InputError("a bag in SQLite storage", where=file, remedy="ros2 bag convert makes an MCAP bag of it")
+        if not file.exists():
+            raise InputError(f"metadata.yaml lists {file.name}, which is not there", where=path)
     return files
 
 
 def _listed(folder: Path) -> list[str]:
+    """File names in metadata.yaml; none where there is no such file, as a killed recorder leaves it."""
     try:
         document = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
-        names = document["rosbag2_bagfile_information"]["relative_file_paths"]
-        return [str(name) for name in names]
+        information = document["rosbag2_bagfile_information"]
+        names = [str(name) for name in information["relative_file_paths"]]
+        mode = str(information.get("compression_mode") or "").lower()
     except FileNotFoundError:
-        return []  # a killed recorder leaves no metadata.yaml; the files are in name order then
-    except (OSError, yaml.YAMLError, KeyError, TypeError, UnicodeDecodeError) as error:
+        return []
+    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
         raise InputError(
             "metadata.yaml cannot be read", where=folder, remedy="remove it: the .mcap files are then taken by name"
         ) from error
+    if mode == "message":
+        raise InputError(
+            "every message is compressed by itself",
+            where=folder,
+            key="compression_mode",
+            value=mode,
+            allowed="file, none",
+            remedy="ros2 bag convert without it; MCAP compresses anyway",
+        )
+    return names
 
 
 def read_parts(path: Path, topics: Sequence[str] | None) -> list[Part]:

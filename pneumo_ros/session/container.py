@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import BinaryIO, NamedTuple, TypeVar
 
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -118,18 +118,37 @@ def parse(kind: type[R], body: bytes, path: object, offset: int) -> R:
 
 @contextmanager
 def mapped(path: Path) -> Iterator[mmap.mmap | bytes]:
-    """The file's bytes, mapped so that a long log does not have to fit in memory twice."""
+    """The file's bytes, mapped so that a long log does not have to fit in memory twice.
+
+    A file that ``ros2 bag record --compression-mode file`` packed as a whole (``.zstd``) is unpacked in memory.
+
+    Raises
+    ------
+    InputError
+        if it cannot be read or unpacked.
+    """
     try:
-        with path.open("rb") as stream:
-            if path.stat().st_size == 0:
-                yield b""
-                return
+        stream = path.open("rb")
+    except OSError as error:
+        raise InputError(f"cannot read the log ({error})", where=path, remedy="give a readable file") from error
+    with stream:
+        if path.suffix == ".zstd":
+            yield _unpacked(stream, path)
+        elif path.stat().st_size == 0:
+            yield b""
+        else:
             with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
                 yield buffer
-    except (OSError, ValueError) as error:
-        if isinstance(error, ValueError) and not isinstance(error, UnicodeDecodeError):
-            raise
-        raise InputError(f"cannot read the log ({error})", where=path, remedy="give a readable file") from error
+
+
+def _unpacked(stream: BinaryIO, path: Path) -> bytes:
+    try:
+        with zstandard.ZstdDecompressor().stream_reader(stream) as reader:
+            return bytes(reader.read())
+    except (zstandard.ZstdError, MemoryError) as error:
+        raise InputError(
+            f"the packed file is broken ({error})", where=path, remedy="nothing in it can be told"
+        ) from error
 
 
 def check_magic(buffer: mmap.mmap | bytes, path: Path) -> None:

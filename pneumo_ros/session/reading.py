@@ -26,7 +26,8 @@ from rosbags.serde import SerdeError
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import Rig, parse_rig
 from pneumo_ros.session.bags import Part, read_parts
-from pneumo_ros.session.layouts import Text, decode, layout_of, type_store
+from pneumo_ros.session.generic import columns_of, joints_of
+from pneumo_ros.session.layouts import Text, UnfitError, decode, layout_of, type_store
 from pneumo_ros.session.records import Records, join
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -171,7 +172,7 @@ class Log:
         columns = self._typed(topic, JOINT_STATE)
         names = columns.texts.get("name")
         if names is None:
-            return _by_name(self, topic, columns)
+            return self._joint_slowly(topic, columns)
         position = columns.arrays["position"]
         if position.shape != (len(columns.stamp_ns), len(names)):
             raise self._broken(topic, f"{len(names)} names but {position.shape[1:]} positions")
@@ -285,13 +286,18 @@ class Log:
         return self._decode_slowly(topic, records)
 
     def _decode_slowly(self, topic: str, records: Records) -> Columns:
-        flat = [dict(_flatten("", message)) for _, message in self.messages(topic)]
-        paths = list(dict.fromkeys(path for row in flat for path in row))
-        values = {path: [row.get(path) for row in flat] for path in paths}
-        # A text that never changes belongs to the topic, as in the bulk way.
-        texts: dict[str, Any] = {p: v[0] for p, v in values.items() if _is_text(v[0]) and all(x == v[0] for x in v)}
-        arrays = {p: _stacked(v) for p, v in values.items() if p not in texts}
+        arrays, texts = columns_of([message for _, message in self.messages(topic)])
         return Columns(_stamps(arrays, records.log_time_ns), records.log_time_ns, arrays, texts)
+
+    def _joint_slowly(self, topic: str, columns: Columns) -> Joint:
+        """Names that change from message to message."""
+        try:
+            names, fields = joints_of([message for _, message in self.messages(topic)])
+        except UnfitError as error:
+            raise self._broken(topic, str(error)) from error
+        position = fields["position"]
+        assert position is not None
+        return Joint(columns.stamp_ns, columns.log_time_ns, names, position, fields["velocity"], fields["effort"])
 
 
 def read_log(path: str | Path, topics: Sequence[str] | None = None) -> Log:
@@ -385,49 +391,3 @@ def _stamps(arrays: dict[str, NDArray[Any]], log_time_ns: NDArray[np.int64]) -> 
 
 def _optional(values: NDArray[Any], count: int) -> NDArray[np.float64] | None:
     return values if values.ndim == 2 and values.shape[1] == count and count > 0 else None
-
-
-def _by_name(log: Log, topic: str, columns: Columns) -> Joint:
-    """Names that change order or number from message to message: each value is put where its name belongs."""
-    messages = [message for _, message in log.messages(topic)]
-    names = tuple(dict.fromkeys(name for message in messages for name in message.name))
-    column = {name: i for i, name in enumerate(names)}
-    fields = {key: np.full((len(messages), len(names)), np.nan) for key in ("position", "velocity", "effort")}
-    for row, message in enumerate(messages):
-        order = [column[name] for name in message.name]
-        for key, into in fields.items():
-            values = getattr(message, key)
-            if len(values) == len(order):
-                into[row, order] = values
-            elif len(values) or key == "position":
-                raise log._broken(topic, f"message {row} has {len(order)} names but {len(values)} values of {key}")
-    optional = {key: None if np.isnan(fields[key]).all() else fields[key] for key in ("velocity", "effort")}
-    return Joint(columns.stamp_ns, columns.log_time_ns, names, fields["position"], **optional)
-
-
-def _flatten(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Leaves of a deserialised message, named as the bulk way names them."""
-    if hasattr(value, "__msgtype__"):
-        for name in value.__dataclass_fields__:
-            if name != "__msgtype__":
-                yield from _flatten(f"{path}.{name}" if path else name, getattr(value, name))
-    elif isinstance(value, list) and value and hasattr(value[0], "__msgtype__"):
-        for i, entry in enumerate(value):
-            yield from _flatten(f"{path}[{i}]", entry)
-    elif isinstance(value, list):
-        yield path, tuple(value)
-    else:
-        yield path, value
-
-
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str) or (isinstance(value, tuple) and all(isinstance(v, str) for v in value))
-
-
-def _stacked(values: list[Any]) -> NDArray[Any]:
-    shapes = {np.shape(v) for v in values if v is not None}
-    if len(shapes) == 1 and not any(v is None or _is_text(v) for v in values):
-        return np.array(values)
-    out = np.empty(len(values), object)
-    out[:] = values if len(shapes) != 1 else [*values]
-    return out

@@ -39,7 +39,7 @@ class Findings:
     phrases : effect id -> what it is, in words
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
-    law : what is missing at the first place, as a curve
+    laws : what is missing at the places, as curves
     """
 
     summary: Mapping[str, Any]
@@ -49,7 +49,7 @@ class Findings:
     phrases: Mapping[str, str] = field(default_factory=dict)
     regimes: Sequence[str] = ()
     conditional: Mapping[str, float] = field(default_factory=dict)
-    law: Law | None = None
+    laws: Sequence[Law] = ()
 
 
 def contents(found: Findings) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def contents(found: Findings) -> dict[str, Any]:
             for place, share in shares.items()
             if share >= 0.01
         ],
-        "law": None if found.law is None else _law(found.law),
+        "laws": [_law(law) for law in found.laws],
         "ladder": ladder(_rungs(summary["gap"])),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
@@ -113,7 +113,7 @@ def confidence(summary: Mapping[str, Any]) -> str:
     """How sure, in words and in per cent."""
     p = float(summary["probability"])
     word = "sure" if p >= SURE else "likely" if p >= LIKELY else "not sure"
-    return f"{word}: {100 * p:.0f} %"
+    return f"{word}: {'above 99' if p > 0.99 else format(100 * p, '.0f')} %"
 
 
 def how_far(summary: Mapping[str, Any]) -> str:

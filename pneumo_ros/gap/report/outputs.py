@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import Diagnosis, write_json
@@ -16,7 +17,11 @@ from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where import Location, conditional_gaps, habitat, locate, missing_law
 from pneumo_ros.gap.where.design import car_of
+from pneumo_ros.gap.where.regimes import harmonics
 
+Array = NDArray[np.float64]
+
+MAX_LAWS = 2
 FILES = ("diagnosis.json", "report.html", "residual.mcap")
 
 
@@ -66,7 +71,28 @@ def _findings(
         holdout=holdout,
         fit_names=[log.name for log in fit],
         phrases={name: effect.summary for name, effect in model.library.items()},
-        regimes=[habitat(where, error).text] if telling else [],
+        regimes=_sentences(where, holdout, error) if telling else [],
         conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),
-        law=missing_law(where, where.chosen[0] if where.chosen else None) if telling else None,
+        laws=[missing_law(where, place) for place in _one_of_a_kind(where)] if telling else [],
     )
+
+
+def _one_of_a_kind(where: Location) -> list[str]:
+    """The first place of each kind (spring, air, tyre, sensor ...): front and rear of one kind show the same law."""
+    kinds: dict[str, str] = {}
+    for place in where.chosen:
+        kinds.setdefault(place.removeprefix("front_").removeprefix("rear_").split(":")[0], place)
+    return list(kinds.values())[:MAX_LAWS]
+
+
+def _sentences(where: Location, holdout: Signals, error: Array) -> list[str]:
+    """When the gap shows, and what its harmonics say where the road is one sine."""
+    out = [habitat(where, error).text]
+    found = harmonics(holdout.road, error, holdout.period)
+    if found is not None:
+        kind = "odd, as symmetric laws make them" if found.odd > found.even else "even, as one-sided laws make them"
+        out.append(
+            f"the road is one sine of {found.frequency:.3g} Hz; the error's harmonics are mostly {kind} "
+            f"(odd {found.odd:.2f}, even {found.even:.2f} of the first)"
+        )
+    return out

@@ -12,6 +12,7 @@ from pneumo_ros.gap.signals.health import all_limits, check_channel
 from pneumo_ros.gap.signals.initial import estimate_initial
 from pneumo_ros.gap.signals.timebase import drivable_span, held, in_order, sampled, split_at_jumps, timing, uniform_grid
 from pneumo_ros.gap.signals.types import COMMANDS, MEASURED, ROADS, Limitation, Signals, TopicData
+from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
 
 Array = NDArray[np.float64]
@@ -227,7 +228,27 @@ def _measured(
         weights.append(checked.weight)
         noises.append(checked.noise)
         stated.append(expected)
-    return np.column_stack(values), np.column_stack(weights), np.array(noises), np.array(stated)
+    columns, weight = np.column_stack(values), np.column_stack(weights)
+    return _filled(columns, weight, rig), weight, np.array(noises), np.array(stated)
+
+
+def _filled(measured: Array, weight: Array, rig: Rig) -> Array:
+    """Channels without a sample get plausible values, so that no equation meets a vacuum; their weight stays zero.
+
+    A displacement is its partner's at the same end, a design height away; a pressure is the static one.
+    """
+    out, used = measured.copy(), np.asarray(weight.any(axis=0))
+    rest = trim(rig)
+    height = rig.design_height.value
+    for end in (0, 1):
+        sprung, axle, pressure = end, 2 + end, 4 + end
+        if not used[axle]:
+            out[:, axle] = measured[:, sprung] - height if used[sprung] else rest.state[axle]
+        if not used[sprung]:
+            out[:, sprung] = out[:, axle] + height
+        if not used[pressure]:
+            out[:, pressure] = rest.pressures[end]
+    return out
 
 
 def replace_name(data: TopicData, old: str, new: str) -> TopicData:

@@ -6,7 +6,7 @@ residual of one is nothing to talk about.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,8 @@ class Design:
     bases : the B shapes
     windows : where the K rows lie
     features : local motion of the log
+    signals : the log
+    bends : sensor -> (K, 6) what its correction adds beside its columns, see :func:`with_sensor_columns`
     """
 
     residual: Array
@@ -62,6 +64,7 @@ class Design:
     windows: Windows
     features: Features
     signals: Signals
+    bends: dict[str, Array] = field(default_factory=dict)
 
 
 def inputs_of(signals: Signals) -> Inputs:
@@ -111,23 +114,26 @@ def design_of(
 
 
 def with_sensor_columns(design: Design, model: RigModel, place: str, coefficients: Array) -> Design:
-    """The same design with one sensor's columns taken half-way to its estimated error.
+    """The same design with one sensor's columns taken at its estimated error.
 
-    The force of a spring bends with its height, so a column taken at zero is off for an offset of a millimetre;
-    half-way to the answer is exact for anything quadratic.
+    The force of a spring bends with its height, and a stop has a corner: columns are tangents at the estimate, and what
+    the estimate itself changes beyond them is kept as the place's bend.
     """
     rows = [k for k, basis in enumerate(design.bases) if basis.place == place]
     car, inputs = car_of(model), inputs_of(design.signals)
-    middle = inputs.measured.copy()
+    there = inputs.measured.copy()
     for k, value in zip(rows, coefficients, strict=True):
-        middle[:, design.bases[k].column] += 0.5 * value * design.bases[k].series
-    moved = inputs._replace(measured=middle)
-    base = weak_residuals(car, moved, design.windows)
+        there[:, design.bases[k].column] += value * design.bases[k].series
+    moved = inputs._replace(measured=there)
+    before = weak_residuals(car, inputs, design.windows)
+    after = weak_residuals(car, moved, design.windows)
+    whitened = design.weight / design.null
     columns = design.columns.copy()
     for k in rows:
-        column = _column(design.bases[k], car, moved, design.windows, base, design.features, FIRST_SENSOR_STEP)
-        columns[k] = column * design.weight / design.null
-    return replace(design, columns=columns)
+        step = _column(design.bases[k], car, moved, design.windows, after, design.features, FIRST_SENSOR_STEP)
+        columns[k] = step * whitened
+    bend = (after - before) * whitened - np.tensordot(coefficients, columns[rows], 1)
+    return replace(design, columns=columns, bends={**design.bends, place: bend})
 
 
 def sensor_noise(car: HalfCar, inputs: Inputs, windows: Windows, noise: Array, seed: int = 0) -> Array:

@@ -18,7 +18,7 @@ from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
-from pneumo_ros.gap.where.solve import Forms, best_subset, forms_of, shapley
+from pneumo_ros.gap.where.solve import Forms, Rows, best_subset, forms_of, shapley
 from pneumo_ros.gap.where.weak import EQUATIONS
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ SINGLED_OUT = 0.3
 LARGEST = 5  # places in a set: two effects at both ends, and one more to see that it is not needed
 # A further place must take this share of what is left (mean square) to be believed.
 WORTH = 0.4
+# Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops).
+SENSOR_PASSES = 3
 BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
 
 
@@ -130,8 +132,8 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
     names = final.testable()
     chosen = _smallest(choice, names)
-    sets = chosen or best_subset(choice, 3, [], names)
-    refit_square = final.value(())
+    sets = chosen or best_subset(choice, min(3, len(names)), [], names)
+    refit_square = max(final.value(()), 1e-12)
     shares = {place: max(part, 0.0) / refit_square for place, part in shapley(final, sets).items()}
     alone = {place: 1.0 - final.value([place]) / refit_square for place in names}
     return Location(
@@ -158,9 +160,12 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
 
 def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> Array:
     """Residuals (K, 6) in null standard deviations with parameters (in sigma) and corrections applied."""
-    return np.asarray(
-        design.residual + np.tensordot(nuisance, design.parameters, 1) + np.tensordot(coefficients, design.columns, 1)
-    )
+    out = design.residual + np.tensordot(nuisance, design.parameters, 1) + np.tensordot(coefficients, design.columns, 1)
+    corrected = {basis.place for basis, value in zip(design.bases, coefficients, strict=True) if value != 0.0}
+    for place, bend in design.bends.items():
+        if place in corrected:
+            out = out + bend
+    return np.asarray(out)
 
 
 def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
@@ -170,8 +175,7 @@ def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Des
     rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
     designs = [first, *rest]
     offset, places = start.offset(model), [basis.place for basis in first.bases]
-    # Twice: the first pass moves to within a few per cent of the sensor's error, the second removes what bends.
-    for _ in range(2):
+    for _ in range(SENSOR_PASSES):
         forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)
         for place in [name for name in forms.testable() if name.startswith("sensor:")]:
             error = forms.solve([place])[len(offset) :]
@@ -179,23 +183,24 @@ def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Des
     return designs
 
 
-def _flat(design: Design) -> tuple[Array, Array]:
+def _flat(design: Design) -> Rows:
     columns = np.concatenate([design.parameters, design.columns])
-    return design.residual.ravel(), columns.reshape(len(columns), -1).T
+    bends = {place: bend.ravel() for place, bend in design.bends.items()}
+    return Rows(design.residual.ravel(), columns.reshape(len(columns), -1).T, bends)
 
 
-def _stacked(designs: Sequence[Design]) -> tuple[Array, Array]:
+def _stacked(designs: Sequence[Design]) -> Rows:
     parts = [_flat(design) for design in designs]
-    return np.concatenate([residual for residual, _ in parts]), np.concatenate([columns for _, columns in parts])
+    bends = {place: np.concatenate([part.bends[place] for part in parts]) for place in parts[0].bends}
+    columns = np.concatenate([part.columns for part in parts])
+    return Rows(np.concatenate([part.residual for part in parts]), columns, bends)
 
 
 def _halved(designs: Sequence[Design], offset: Array, places: Sequence[str]) -> Forms:
     """Fitted on every other block of the logs to fit, judged on the blocks between."""
-    residual, columns = _stacked(designs)
+    rows = _stacked(designs)
     odd = np.concatenate([_odd_rows(design) for design in designs])
-    return forms_of(
-        (residual * ~odd, columns * ~odd[:, None]), (residual * odd, columns * odd[:, None]), offset, places
-    )
+    return forms_of(rows.masked(~odd), rows.masked(odd), offset, places)
 
 
 def _odd_rows(design: Design) -> NDArray[np.bool_]:
@@ -210,7 +215,7 @@ def _smallest(forms: Forms, places: Sequence[str]) -> list[str]:
     for size in range(1, min(LARGEST, len(places)) + 1):
         sets.append(best_subset(forms, size, sets[-1], places))
         levels.append(forms.value(sets[-1]))
-    if levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]:
+    if len(levels) < 2 or (levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]):
         return []
     for size, level in enumerate(levels[1:], start=1):
         ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]

@@ -5,9 +5,10 @@ Fitted on one log, judged on another: both as quadratic forms, so that a subset 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,24 +23,48 @@ REACH = 3.0  # standard deviations that a parameter may be off
 LOOSENESS = 30.0
 
 
+class Rows(NamedTuple):
+    """Residuals of some windows and what changes them.
+
+    Attributes
+    ----------
+    residual : (n,)
+    columns : (n, P + B) change by one unit of each parameter and each basis
+    bends : place -> (n,) what a correction there adds beside its columns (they are tangents; a sensor's error bends)
+    """
+
+    residual: Array
+    columns: Array
+    bends: Mapping[str, Array]
+
+    def masked(self, rows: NDArray[np.bool_]) -> Rows:
+        """The same with all other rows zero."""
+        bends = {place: bend * rows for place, bend in self.bends.items()}
+        return Rows(self.residual * rows, self.columns * rows[:, None], bends)
+
+
 @dataclass
 class Forms:
     """Quadratic forms of a fit and of a judge, over P parameters and the bases, grouped by place.
 
-    Built by :func:`forms_of`. ``fit_*`` and ``judge_*`` hold A'A, A'r and r'r of residual r and columns A (whose
-    coefficients reduce it: |r + A x|^2), ``rows`` the number of judged residuals, ``offset`` (P,) how many standard
-    deviations from nominal the parameters already are: the prior holds the sum.
+    Attributes
+    ----------
+    parameters : P
+    groups : place -> its columns
+    bends : place -> column of its bend
+    sizes : (B,) rms of each basis column over the fitted rows
+    fit, judge : Gram matrices of [columns, bends, residual]; the residual and the bends of corrected places enter with
+        coefficient one, the rest with the coefficients sought
+    rows : number of judged residuals
+    offset : (P,) how many standard deviations from nominal the parameters already are: the prior holds the sum
     """
 
     parameters: int
     groups: dict[str, NDArray[np.intp]]
+    bends: dict[str, int]
     sizes: Array
-    fit_gram: Array
-    fit_cross: Array
-    fit_square: float
-    judge_gram: Array
-    judge_cross: Array
-    judge_square: float
+    fit: Array
+    judge: Array
     rows: float
     offset: Array
     cache: dict[frozenset[str], tuple[float, Array]] = field(default_factory=dict)
@@ -54,11 +79,12 @@ class Forms:
 
     def solve(self, places: Iterable[str]) -> Array:
         """Coefficients of the parameters (in standard deviations) and of these places' shapes, fitted."""
-        index = self.index(places)
+        chosen = sorted(places)
+        index, ones = self.index(chosen), self._ones(chosen)
         prior = np.ones(len(index))
         prior[self.parameters :] = (self.sizes[index[self.parameters :] - self.parameters] / LOOSENESS) ** 2
-        gram = self.fit_gram[np.ix_(index, index)] + np.diag(prior)
-        cross = -self.fit_cross[index]
+        gram = self.fit[np.ix_(index, index)] + np.diag(prior)
+        cross = -self.fit[np.ix_(index, ones)].sum(axis=1)
         cross[: self.parameters] -= self.offset
         return _bounded(gram, cross, self.offset)
 
@@ -70,43 +96,39 @@ class Forms:
         """As :meth:`solve`, remembered."""
         return self._solved(frozenset(places))[1]
 
-    def fitted(self, places: Iterable[str]) -> float:
-        """Mean square on the fitted residuals themselves, in the same unit as :meth:`value` if rows agree."""
-        x, index = self.coefficients(places), self.index(places)
-        return _square(self.fit_square, self.fit_cross[index], self.fit_gram[np.ix_(index, index)], x) / self.rows
+    def _ones(self, places: Iterable[str]) -> NDArray[np.intp]:
+        return np.array([*(self.bends[place] for place in places if place in self.bends), len(self.fit) - 1])
 
     def _solved(self, places: frozenset[str]) -> tuple[float, Array]:
         if places not in self.cache:
-            x, index = self.solve(places), self.index(places)
-            square = _square(self.judge_square, self.judge_cross[index], self.judge_gram[np.ix_(index, index)], x)
-            self.cache[places] = (square / self.rows, x)
+            x = self.solve(places)
+            whole = np.concatenate([x, np.ones(len(self._ones(places)))])
+            index = np.concatenate([self.index(places), self._ones(sorted(places))]).astype(int)
+            square = float(whole @ self.judge[np.ix_(index, index)] @ whole)
+            self.cache[places] = (max(square, 0.0) / self.rows, x)
         return self.cache[places]
 
 
-def forms_of(fit: tuple[Array, Array], judge: tuple[Array, Array], offset: Array, places: Sequence[str]) -> Forms:
-    """Quadratic forms from residuals (n,) and columns (n, P + B) of the fitted and the judged rows.
+def forms_of(fit: Rows, judge: Rows, offset: Array, places: Sequence[str]) -> Forms:
+    """Quadratic forms of the fitted and of the judged rows.
 
     Parameters
     ----------
-    fit, judge : residual and columns of each; rows that carry nothing are zero
+    fit, judge : rows that carry nothing are zero
     offset : (P,) standard deviations that the parameters already are from nominal
     places : (B,) place of each basis column
     """
-    parameters = len(offset)
+    parameters, count = len(offset), fit.columns.shape[1]
     groups = {place: parameters + np.flatnonzero(np.asarray(places) == place) for place in dict.fromkeys(places)}
-    fit_residual, fit_columns = fit
-    residual, columns = judge
-    sizes = np.sqrt(np.mean(fit_columns[:, parameters:] ** 2, axis=0)) + 1e-9
-    return Forms(
-        parameters, groups, sizes,
-        fit_columns.T @ fit_columns, fit_columns.T @ fit_residual, float(fit_residual @ fit_residual),
-        columns.T @ columns, columns.T @ residual, float(residual @ residual),
-        float(max(int(np.count_nonzero(residual)), 1)), offset,
-    )  # fmt: skip
+    sizes = np.sqrt(np.mean(fit.columns[:, parameters:] ** 2, axis=0)) + 1e-9
+    bends = {place: count + k for k, place in enumerate(fit.bends)}
+    rows = float(max(int(np.count_nonzero(judge.residual)), 1))
+    return Forms(parameters, groups, bends, sizes, _gram(fit), _gram(judge), rows, offset)
 
 
-def _square(square: float, cross: Array, gram: Array, x: Array) -> float:
-    return float(max(square + 2.0 * np.dot(x, cross) + np.dot(x, gram @ x), 0.0))
+def _gram(rows: Rows) -> Array:
+    whole = np.column_stack([rows.columns, *rows.bends.values(), rows.residual])
+    return np.asarray(whole.T @ whole)
 
 
 def _bounded(gram: Array, cross: Array, offset: Array) -> Array:

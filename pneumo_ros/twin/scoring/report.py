@@ -99,6 +99,7 @@ def write_report(
         f"![reliability and risk]({plot.name})",
         _confusion(cases),
         _failures(cases),
+        _short_of_grade(cases),
     ]
     page.parent.mkdir(parents=True, exist_ok=True)
     earlier = page.read_text("utf-8").partition(MARK)[2].strip() if page.exists() else ""
@@ -149,6 +150,17 @@ def _failures(cases: Sequence[Case]) -> str:
         ])  # fmt: skip
     head = ["case", "kind", "truth", "gap/floor", "verdict", "group", "ranking"]
     return f"### Every failure ({len(rows)})\n\n" + (_markdown(head, rows) if rows else "None.")
+
+
+def _short_of_grade(cases: Sequence[Case]) -> str:
+    """Effects whose largest sane size leaves a smaller gap than was wanted: said, not stretched."""
+    rows = [
+        [str(c.label["case"]), _truth_text(c.label), f"{c.label['grade']:g}", f"{c.label['ratio']['fit']:.2f}"]
+        for c in cases
+        if c.kind != "pair" and c.label["grade"] and c.label["ratio"]["fit"] < 0.9 * c.label["grade"]
+    ]
+    head = ["case", "effect", "wanted gap/floor", "reached at the largest sane size"]
+    return f"### Short of their grade ({len(rows)})\n\n" + (_markdown(head, rows) if rows else "None.")
 
 
 def _truth_text(label: Label) -> str:

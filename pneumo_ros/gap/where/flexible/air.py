@@ -30,6 +30,7 @@ def air_bases(features: Features, i: int) -> list[Basis]:
         "constant": np.full_like(flow, SHARE * usual),
         "pressure": usual * (end.pressure / pressure - 1.0),
         "height": usual * end.travel / 5e-3 * SHARE,
+        "other valve": SHARE * flow * (features.ends[1 - i].inlet - size.openings[1 - i][1]),
         "cross flow": usual * (end.other_pressure - end.pressure) / pressure,
         "drift": SHARE * usual * features.time / 10.0,
     }

@@ -1,0 +1,97 @@
+"""The course of a session on hardware: start when everybody is ready, deactivate on a trip, end after its duration."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import TYPE_CHECKING
+
+from rclpy.lifecycle import TransitionCallbackReturn
+from std_msgs.msg import String
+
+from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.nodes.base import ERROR, OK
+from pneumo_ros.session.topics import READY
+
+if TYPE_CHECKING:
+    from pneumo_ros.nodes.daq import DaqNode
+
+LOOK_PERIOD = 0.01  # s between looks at the driver's mode
+PROGRESS_PERIOD = 0.2  # s between progress lines
+TRIPPED, NOT_STARTED = 1, 2  # exit codes
+
+
+class SessionCourse:
+    """Triggers the node's transitions from the executor's thread, where they belong.
+
+    Parameters
+    ----------
+    node : its parameters autostart, arm_patience, duration and report_progress are obeyed
+    """
+
+    def __init__(self, node: DaqNode) -> None:
+        self._node = node
+        self._ready: set[str] = set()
+        self._asked = self._next_progress = 0.0
+        self._first_ns = 0
+        node.create_subscription(String, READY.name, self._on_ready, node.ready_qos())
+        node.create_timer(LOOK_PERIOD, self._look)
+
+    def _on_ready(self, message: String) -> None:
+        self._ready.add(message.data)
+        wanted = set(str(self._node.values["session_nodes"]).split(","))
+        if not self._asked and self._node.values["autostart"] and wanted <= self._ready:
+            self._asked = time.monotonic()
+
+    def _look(self) -> None:
+        node, state = self._node, self._node.state_label
+        if node.stop.set:
+            return
+        if node.driver is not None and node.driver.failed:
+            trip = node.driver.core.trip
+            self._end(TRIPPED, f"error: {trip.message if trip else 'the driver failed'}")
+        elif self._asked and not self._first_ns:
+            self._start(state)
+        elif state == "active" and node.driver is not None and node.driver.core.mode is not Mode.ARMED:
+            node.trigger_deactivate()
+        if self._first_ns:
+            self._pass((time.monotonic_ns() - self._first_ns) * 1e-9)
+
+    def _start(self, state: str) -> None:
+        node, done = self._node, TransitionCallbackReturn.SUCCESS
+        if state == "unconfigured" and node.trigger_configure() is not done:
+            self._give_up(node.reason)
+        elif state == "inactive" and node.driver is not None:
+            why = node.driver.core.blockers(time.monotonic_ns())
+            if not why and node.trigger_activate() is done:
+                self._first_ns = time.monotonic_ns()
+                node.event(OK, "session_started", "valves armed", {"start_ns": str(node.wall.ros(self._first_ns))})
+            elif time.monotonic() - self._asked > node.values["arm_patience"]:
+                self._give_up(f"cannot arm: {'; '.join(why) or node.reason}")
+
+    def _give_up(self, why: str) -> None:
+        self._node.event(ERROR, "session_not_started", why)
+        self._end(NOT_STARTED, f"error: {why}")
+
+    def _pass(self, elapsed: float) -> None:
+        values = self._node.values
+        if values["report_progress"] and elapsed >= self._next_progress:
+            self._next_progress = elapsed + PROGRESS_PERIOD
+            print(f"PROGRESS {elapsed:.3f}", flush=True)
+        if 0.0 < values["duration"] <= elapsed:
+            self._finish()
+
+    def _finish(self) -> None:
+        node = self._node
+        trip = node.driver.core.trip if node.driver is not None else None
+        if node.state_label == "active":
+            node.trigger_deactivate()
+        elif trip is not None:
+            after = (trip.time_ns - self._first_ns) * 1e-9
+            self._end(TRIPPED, f"valves were made safe {after:.3f} s after arming: {trip.message}")
+        node.event(OK, "session_complete", "the session's duration has passed")
+        node.stop.set = True
+
+    def _end(self, code: int, words: str) -> None:
+        print(words, file=sys.stderr, flush=True)
+        self._node.exit_code, self._node.stop.set = code, True
