@@ -18,6 +18,7 @@ from typing import IO
 
 import numpy as np
 import pytest
+import sessions
 from browser import browser
 from test_log_tools import contract_log
 from test_reading import write
@@ -187,8 +188,8 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
     """One real session: the red button closes the valves, a gain changes, and the page stays when the session ends."""
     pytest.importorskip("rclpy")
     path = tmp_path / "session.mcap"
-    domain = str(100 + os.getpid() % 100)
-    command = ("run", "--view", "--single-process", "--duration", "15", "--no-picture", "--domain-id", domain,
+    domain = str(sessions.own_domain())
+    command = ("run", "--view", "--single-process", "--duration", "300", "--no-picture", "--domain-id", domain,
                "--output", str(path))  # fmt: skip
     with served(*command, module="pneumo_ros.cli.main") as (url, process), browser() as tab:
         tab.open(url)
@@ -198,7 +199,8 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.wait(lambda: tab.model("set-controller-pole", "value"), "the gains")
         tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
         tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
-        tab.wait(lambda: ">ended<" in tab.model("status", "text"), "the session's end", 60)
+        os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)
+        tab.wait(lambda: "nothing heard" in tab.model("status", "text"), "the session's end", 60)
         tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
         assert process.poll() is None and process.stdout is not None
         assert line_with("the dashboard stays", process.stdout, 60.0)
