@@ -1,4 +1,4 @@
-"""What an estimator and a controller step cost, called from Python, beside a plant period: python bench/control_step.py.
+"""What estimator and controller steps cost, called from Python, beside a plant period: python bench/control_step.py.
 
 Medians of interleaved rounds in one run; the ratios are what compares between machines.
 """
