@@ -130,6 +130,7 @@ def test_info_shows_what_explains_the_run(tmp_path: Path) -> None:
     messages = [
         *contract_log(),
         ("/rig/config", STRING, T0 + 1, text(rig.to_yaml())),
+        ("/rig/calibration", STRING, T0, text("sprung_front: {slope: -0.0270281}\n")),
         ("/rig/setup", STRING, T0, text("node: road_profile\ntime_ns: 1\nparameters: {seed: 11, road_class: D}\n")),
         ("/rig/setup", STRING, T0 + 10**8, text("node: controller\nparameters: {lambda: 20.0}\n")),
         ("/rig/events", "diagnostic_msgs/msg/DiagnosticArray", T0 + 5, message),
@@ -137,7 +138,16 @@ def test_info_shows_what_explains_the_run(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", messages)
     result = run(app, ["info", str(path)], env={"COLUMNS": "150"})
     assert result.exit_code == 0, result.output
-    for word in ("trip_pressure", "pressure too high", "seed", "11", "lambda", "20.0", "51.5 (nominal 50.33)"):
+    for word in (
+        "trip_pressure",
+        "pressure too high",
+        "seed",
+        "11",
+        "lambda",
+        "20.0",
+        "51.5 (nominal 50.33)",
+        "-0.0270281",
+    ):
         assert word in result.output, word
     assert '"code": "trip_pressure"' in run(app, ["info", str(path), "--json"]).output
 
