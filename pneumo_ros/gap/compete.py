@@ -16,6 +16,7 @@ from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials
 
+STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
 
@@ -33,11 +34,11 @@ class Effort:
     short, long : iterations of a short and of a full fit
     """
 
-    singles: int = 14
-    finalists: int = 6
-    seconds: tuple[int, ...] = (7, 4, 3)
-    blind_pairs: int = 4
-    pair_finalists: int = 4
+    singles: int = 12
+    finalists: int = 5
+    seconds: tuple[int, ...] = (6, 4, 2)
+    blind_pairs: int = 3
+    pair_finalists: int = 3
     short: int = 3
     long: int = 8
 
@@ -109,7 +110,7 @@ def _run_singles(contest: Contest) -> None:
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
     short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles, 3), (0.1, 0.4))
-    ended = [_finish(problem, one, effort) for one in short[: effort.finalists]]
+    ended = [_finish(problem, one, effort, k < STARTED_TWICE) for k, one in enumerate(short[: effort.finalists])]
     contest.singles = _by_cost(ended) + short[effort.finalists :]
 
 
@@ -134,7 +135,7 @@ def _run_pairs(contest: Contest) -> None:
     found = trials(problem, contest.refit, all_parts(problem))
     blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
     short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
-    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
+    ended = [_finish(problem, one, effort, False) for one in short[: effort.pair_finalists]]
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
 
 
@@ -167,11 +168,11 @@ def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tu
     return _by_cost(out)
 
 
-def _finish(problem: Problem, short: Fit, effort: Effort) -> Fit:
-    """To convergence, from where the short fit ended and from its effect's other shapes; the best of them."""
+def _finish(problem: Problem, short: Fit, effort: Effort, shapes: bool) -> Fit:
+    """To convergence, from where the short fit ended and, with ``shapes``, from its effect's other shapes; the best."""
     best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
     parameters = problem.effect_parameters(short.candidate)
-    if len(short.candidate.parts) > 1 or all(p.size for p in parameters):
+    if not shapes or all(p.size for p in parameters):
         return best
     for values in start_values(parameters)[2:]:
         kept = problem.values(best.candidate, best.x)

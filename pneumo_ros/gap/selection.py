@@ -37,12 +37,12 @@ class Thresholds:
     """
 
     first: float = 0.3
-    second: float = 0.3
+    second: float = 0.5
     first_cost: float = 15.0
     second_cost: float = 20.0
     least: float = 0.3
     relief: float = 15.0
-    model_form: float = 0.03
+    model_form: float = 0.05
 
 
 @dataclass(frozen=True)

@@ -98,8 +98,8 @@ class RigNode(Node):
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
-        if "daq" in str(self.values["session_nodes"]).split(","):
-            prefer_this_process()  # hardware does not wait for other programs
+        if "daq" in str(self.values["session_nodes"]).split(",") and name != "session_recorder":
+            prefer_this_process()  # hardware does not wait for other programs; the recorder may
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
