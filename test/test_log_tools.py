@@ -82,7 +82,7 @@ BROKEN = {
     "not a number": (("/rig/displacement", 7, joint(T0 + 7 * PERIOD, [np.nan, 0, 0, 0])), "not finite"),
     "negative area": (("/valve/command", 7, joint(T0 + 7 * PERIOD, [-1e-6] * 4, VALVES)), "outside 0 to"),
     "channel missing": (("/rig/displacement", 7, joint(T0 + 7 * PERIOD, [0.0] * 3, NAMES[:3])), "not finite"),
-    "clock back": (("/road/profile", 7, joint(T0, [0, 0], ("front", "rear"), (0, 0))), "backwards"),
+    "clock back": (("/road/profile", 7, joint(T0 - 10**9, [0, 0], ("front", "rear"), (0, 0))), "backwards"),
 }
 
 
@@ -92,6 +92,12 @@ def test_each_breach_is_an_error(tmp_path: Path, name: str) -> None:
     path = write(tmp_path / "a.mcap", replaced(contract_log(), topic, at, message))
     assert any(topic in line and word in line for line in found(path, "error"))
     assert run(app, ["validate", str(path)]).exit_code == 1
+
+
+def test_a_little_out_of_order_is_a_warning(tmp_path: Path) -> None:
+    late = ("/valve/command", 7, joint(T0, np.full(4, 1e-6), VALVES))
+    path = write(tmp_path / "a.mcap", replaced(contract_log(), *late))
+    assert any("backwards, by 0.012 s" in line for line in found(path, "warning")) and not found(path, "error")
 
 
 def test_a_missing_topic_and_a_broken_config_are_errors(tmp_path: Path) -> None:
