@@ -38,6 +38,8 @@ from pneumo_ros.session.dashboard.source import Playback
 from pneumo_ros.session.inspection import read_events
 from pneumo_ros.session.reading import read_log
 
+pytestmark = pytest.mark.realtime
+
 TOKEN = generate_jwt_token(generate_session_id())
 URL = re.compile(r"http://\S+")
 
