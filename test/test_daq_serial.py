@@ -211,6 +211,8 @@ import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 from serial_rig import Loop, SerialRig
+
+pytestmark = pytest.mark.realtime
 rig = SerialRig(Path(sys.argv[1]), loop=Loop())
 rig.driver.open()
 rig.arm()

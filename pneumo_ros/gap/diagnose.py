@@ -16,7 +16,7 @@ from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, no
 from pneumo_ros.gap.model import Active, Array, Mask, Model
 from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Candidate, Problem
-from pneumo_ros.gap.selection import Scored, Thresholds, score, select
+from pneumo_ros.gap.selection import Scored, Thresholds, null_thresholds, score, select
 from pneumo_ros.gap.uncertainty import covariance, effect_estimates, nuisance_estimates
 from pneumo_ros.gap.verdict import Calibration, Opinion, judge, name_of
 
@@ -59,7 +59,7 @@ class Options:
 
     pairs: bool = True
     effort: Effort = field(default_factory=Effort)
-    limits: Thresholds = field(default_factory=Thresholds)
+    limits: Thresholds = field(default_factory=null_thresholds)
     calibration: Calibration = field(default_factory=Calibration)
     locate: Locate | None = None
     experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None

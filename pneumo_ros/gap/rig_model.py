@@ -152,6 +152,10 @@ class RigModel:
                 out = effect.outputs(out, record.period, channels_of(one.site), one.values)
         return out
 
+    def simulate_channels(self, state: Array) -> Array:
+        """What ideal sensors show of one state, (6,)."""
+        return _channels(np.asarray(state, dtype=float), self._base.body)
+
     def states(
         self,
         record: Signals,

@@ -7,14 +7,17 @@ the library are true to.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
+from pneumo_ros.paths import share_file
 
 FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
 TOLL = 4.0  # of the cost, for each parameter
@@ -23,14 +26,12 @@ SAME = 0.05  # relative difference of levels that is none, whatever the blocks s
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What counts as evidence.
+    """What counts as evidence: floors for model form; :func:`null_thresholds` raises them where chance wins more.
 
     Attributes
     ----------
     first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
     first_cost, second_cost : fall of the training cost that it must bring
-    relief : fall of the prior's share of the cost that is evidence by itself: a structure that needs no stretched
-        tolerances, where the poorer one does
     least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
@@ -41,8 +42,31 @@ class Thresholds:
     first_cost: float = 15.0
     second_cost: float = 20.0
     least: float = 0.3
-    relief: float = 15.0
     model_form: float = 0.05
+
+
+@lru_cache(maxsize=1)
+def null_thresholds() -> Thresholds:
+    """The floors of :class:`Thresholds`, raised to what the worst of the null distribution wins by.
+
+    The table (config/tables/diagnosis_null.csv) holds, for simulated rigs inside their tolerances, what the best effect
+    won that was not there: over the refit (``added`` 1) and on top of a true effect (``added`` 2).
+    """
+    floor = Thresholds()
+    with share_file("config", "tables", "diagnosis_null.csv").open(newline="", encoding="utf-8") as handle:
+        rows = list(csv.DictReader(handle))
+
+    def worst(column: str, added: int) -> float:
+        return max((float(row[column]) for row in rows if int(row["added"]) == added), default=0.0)
+
+    return replace(
+        floor,
+        first=max(floor.first, worst("advantage", 1)),
+        second=max(floor.second, worst("advantage", 2)),
+        first_cost=max(floor.first_cost, worst("cost", 1)),
+        second_cost=max(floor.second_cost, worst("cost", 2)),
+        least=max(floor.least, worst("fall", 1)),
+    )
 
 
 @dataclass(frozen=True)
@@ -103,9 +127,7 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         best = _simplest(rivals)
         poorer = chosen
         fallen = poorer.level - best.level
-        better = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
-        relieved = poorer.stretch - best.stretch > limits.relief and advantage(poorer, best) > -0.1
-        evidence = better or (size == 1 and relieved)
+        evidence = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
         beyond_form = fallen > limits.model_form**2 * refit.level
         if evidence and (size == 1 or beyond_form):
             chosen = best

@@ -85,13 +85,15 @@ def _named(
     differences within what laws of the right kind leave count less."""
     form = limits.model_form**2 * refit.level
 
+    # Stretched tolerances tell sides and rivals of one kind apart; whether there is an effect, the data must say.
+    least = {size: min((f.stretch for f in (refit, *finalists) if f.size == size), default=0.0) for size in (0, 1, 2)}
     count = {size: sum(f.size == size for f in finalists) for size in (0, 1, 2)}
 
     def height(s: Scored) -> float:
         level = np.log(FORM + form + s.level)
         toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
         toll += np.log(max(1, count[s.size])) / calibration.sharpness
-        return float(-calibration.sharpness * (level + toll) - 0.5 * s.stretch)
+        return float(-calibration.sharpness * (level + toll) - 0.5 * (s.stretch - least[s.size]))
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())

@@ -1,0 +1,138 @@
+"""What effects that are not there win by: the null distribution behind the thresholds of gap/selection.py.
+
+Each seed draws a rig inside its tolerances, simulates two logs of it (sensor noise, commands that jump between the
+rows as the logs of a 1 kHz controller do) and lets the competition run: once with no effect (what does the best single
+win over the refit?), once with one effect of the library (what does the best pair win over the best single?). The
+table goes to config/tables/diagnosis_null.csv, which :func:`pneumo_ros.gap.selection.null_thresholds` reads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pneumo_ros.gap.compete import Contest, Effort, compete
+from pneumo_ros.gap.model import Active
+from pneumo_ros.gap.problem import Problem
+from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.gap.selection import Scored, advantage, score
+from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
+from pneumo_ros.plant.trim import trim
+from pneumo_ros.rig import load_rig
+
+SECONDS, RATE = 10.0, 500.0
+TABLE = Path(__file__).resolve().parent.parent / "config" / "tables" / "diagnosis_null.csv"
+COLUMNS = ("seed", "added", "truth", "advantage", "fall", "cost", "relief")
+
+
+def excitation(rng: np.random.Generator, model: RigModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Road (N, 2), commands at 1 kHz (2N, 4), and those rows that a 500 Hz log shows (N, 4)."""
+    count = round(SECONDS * RATE)
+    t = np.arange(count) / RATE
+    frequencies = np.geomspace(0.4, 18.0, 24)
+    phases = rng.uniform(0.0, 2.0 * np.pi, (2, 24))
+    road = np.zeros((count, 2))
+    for f, phase in zip(frequencies, phases.T, strict=True):
+        road += 2.2e-3 / (1.0 + f) * np.sin(2.0 * np.pi * f * t[:, None] + phase) * np.minimum(t, 1.0)[:, None]
+    fast = np.tile(trim(model.rig).command, (2 * count, 1))
+    for column in (0, 1):
+        level, row = 1.0, 0
+        while row < 2 * count:
+            hold = int(rng.integers(100, 600))
+            fast[row : row + hold, column] *= level
+            level, row = rng.uniform(0.75, 1.25), row + hold
+    return road, fast, fast[::2]
+
+
+def make_log(model: RigModel, nuisance: np.ndarray, active: Sequence[Active], seed: int) -> Signals:
+    """A log of the model itself with sensor noise."""
+    rng = np.random.default_rng(seed)
+    road, fast, shown = excitation(rng, model)
+    rest = trim(model.rig).state
+    blank = _signals(model, np.tile(model.simulate_channels(rest), (len(road), 1)), road, shown, rng)
+    true = replace(blank, commands=fast.reshape(-1, 2, 4).mean(axis=1))
+    return _signals(model, model.simulate(true, nuisance, rest, active), road, shown, rng)
+
+
+def _signals(
+    model: RigModel, clean: np.ndarray, road: np.ndarray, commands: np.ndarray, rng: np.random.Generator
+) -> Signals:
+    rig = model.rig
+    noise = np.array([rig.displacement_noise.value] * 4 + [rig.pressure_noise.value] * 2)
+    y = clean + rng.normal(size=clean.shape) * noise
+    t = np.arange(len(y)) / RATE
+    return prepare(
+        {
+            "/road/profile": TopicData(t, dict(zip(ROADS, road.T, strict=True))),
+            "/valve/command": TopicData(t, dict(zip(COMMANDS, commands.T, strict=True))),
+            "/rig/displacement": TopicData(t, dict(zip(MEASURED[:4], y[:, :4].T, strict=True))),
+            "/rig/front/pressure": TopicData(t, {"pressure": y[:, 4]}),
+            "/rig/rear/pressure": TopicData(t, {"pressure": y[:, 5]}),
+        },
+        rig,
+        "simulated",
+    )
+
+
+def drawn(model: RigModel, rng: np.random.Generator) -> np.ndarray:
+    """Nuisance values inside the tolerances, cut at 2.5 sigma."""
+    sigmas = np.clip(rng.normal(size=len(model.parameters)), -2.5, 2.5)
+    return np.array([p.nominal + p.std * s for p, s in zip(model.parameters, sigmas, strict=True)])
+
+
+def drawn_effect(model: RigModel, rng: np.random.Generator) -> Active:
+    """A random effect at a random site, between half and four times its typical size."""
+    effect = model.library[str(rng.choice(sorted(model.library)))]
+    size = float(np.exp(rng.uniform(np.log(0.5), np.log(4.0))))
+    values = [float(np.clip(p.typical * size, p.low, p.high)) if p.size else p.typical for p in effect.parameters]
+    return Active(effect.id, str(rng.choice(effect.sites)), tuple(values))
+
+
+def win(poorer: Scored, richer: Scored) -> tuple[float, float, float, float]:
+    """Advantage, fall of level, of training cost, and of stretched tolerances."""
+    return (
+        advantage(poorer, richer),
+        poorer.level - richer.level,
+        poorer.fit.cost - richer.fit.cost,
+        poorer.stretch - richer.stretch,
+    )
+
+
+def best_of(contest: Contest, size: int) -> Scored | None:
+    """The structure of that many effects with the lowest level on the selection blocks."""
+    scored = [score(contest.problem, f) for f in contest.finalists if len(f.candidate.parts) == size]
+    return min(scored, key=lambda s: s.level, default=None)
+
+
+def main() -> None:
+    """Run the seeds and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=40)
+    parser.add_argument("--output", type=Path, default=TABLE)
+    options = parser.parse_args()
+    model = RigModel(load_rig())
+    rows = []
+    for seed in range(options.seeds):
+        rng = np.random.default_rng([2026, seed])
+        nuisance, effect = drawn(model, rng), drawn_effect(model, rng)
+        for truth in ((), (effect,)):
+            log = make_log(model, nuisance, truth, seed)
+            contest = compete(Problem(model, (log,)), Effort(), bool(truth), lambda share, what: None)
+            poorer = score(contest.problem, contest.refit) if not truth else best_of(contest, 1)
+            richer = best_of(contest, len(truth) + 1)
+            if poorer is None or richer is None:
+                continue
+            label = " ".join(f"{a.effect}:{a.site}" for a in truth) or "none"
+            rows.append((seed, len(truth) + 1, label, *(round(v, 4) for v in win(poorer, richer))))
+            print(*rows[-1], flush=True)
+            with options.output.open("w", newline="", encoding="utf-8") as handle:
+                csv.writer(handle, lineterminator="\n").writerows([COLUMNS, *rows])
+
+
+if __name__ == "__main__":
+    main()
