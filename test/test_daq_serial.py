@@ -23,6 +23,8 @@ from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.daq.reasons import Level, Reason
 from pneumo_ros.errors import InputError
 
+pytestmark = pytest.mark.realtime
+
 REACTION = 50.0  # ms
 ATTEMPTS = 4  # when the computer stalled so long that a timeout was right to trip before the scenario began
 FAULT_AT = 0.4  # s after arming
@@ -227,7 +229,7 @@ def test_a_killed_driver_leaves_the_valves_to_the_firmware(tmp_path: Path) -> No
     def scenario(folder: Path) -> None:
         with emulated(folder) as rig:
             arguments = [sys.executable, "-c", KILLED_DRIVER, str(folder), str(Path(__file__).parent)]
-            with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as driver:
+            with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as driver:
                 assert driver.stdout is not None
                 said = driver.stdout.readline().strip()
                 time.sleep(0.3)
