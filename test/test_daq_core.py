@@ -115,6 +115,22 @@ def test_a_silent_board_trips_and_the_link_comes_back_unarmed() -> None:
     assert bench.core.phase is Phase.RUNNING and bench.reasons().count(Reason.LINK_OPEN) == 2
 
 
+def test_stamps_survive_a_stall_and_a_new_handshake() -> None:
+    """Everything held back for 0.8 s comes at once: the stamps are those of the samples, not of their arrival."""
+    bench, held = Bench().run(1500), bytearray()
+    count = len(bench.measurements)
+    bench.up = lambda data: (held.extend(data), b"")[1]
+    bench.run(800)
+    assert bench.core.phase is Phase.HANDSHAKE
+    bench.up = lambda data: data
+    bench.to_host[:0] = held
+    bench.run(300)
+    late = bench.measurements[count:]
+    assert len(late) > 200
+    true = [START + (m.sequence + 1) * MS for m in late]
+    assert max(abs(m.stamp_ns - t) for m, t in zip(late, true, strict=True)) < MS / 2
+
+
 def test_a_board_that_restarts_is_met_again_and_not_armed() -> None:
     bench = Bench().armed()
     before = bench.now

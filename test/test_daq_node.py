@@ -37,6 +37,8 @@ from pneumo_ros.nodes.controller import ControllerNode
 from pneumo_ros.session import topics
 from pneumo_ros.session.reading import Log, read_log
 
+pytestmark = pytest.mark.realtime
+
 RATE = 250  # Hz; five processes of a session and the emulator share the cores with everything else
 TRIES = 3  # sessions that a stall of this computer tripped before the scenario
 

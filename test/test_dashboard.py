@@ -38,6 +38,8 @@ from pneumo_ros.session.dashboard.source import Playback
 from pneumo_ros.session.inspection import read_events
 from pneumo_ros.session.reading import read_log
 
+pytestmark = pytest.mark.realtime
+
 TOKEN = generate_jwt_token(generate_session_id())
 URL = re.compile(r"http://\S+")
 
@@ -228,5 +230,8 @@ def test_ring_keeps_the_newest_and_begins_again_when_time_goes_back() -> None:
         ring.append(10 * i, [float(i)])
     assert ring.since(0).time_ns.tolist() == [20, 30, 40, 50]
     assert ring.since(35).values[:, 0].tolist() == [4.0, 5.0]
-    ring.append(5, [9.0])
-    assert ring.since(0).time_ns.tolist() == [5]
+    ring.append(45, [9.0])  # a little late: sorted in
+    assert ring.since(0).time_ns.tolist() == [30, 40, 45, 50]
+    assert ring.since(45).values[:, 0].tolist() == [9.0, 5.0]
+    ring.append(-(10**9) - 1, [7.0])
+    assert ring.since(-(10**10)).values[:, 0].tolist() == [7.0]

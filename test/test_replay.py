@@ -47,6 +47,8 @@ from pneumo_ros.nodes.road_profile import RoadProfileNode  # noqa: E402
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode  # noqa: E402
 from pneumo_ros.nodes.spin import make_executor, spin  # noqa: E402
 
+pytestmark = pytest.mark.realtime
+
 DURATION = 2.0
 NEW_POLE = 14.0
 OUTPUTS = (topics.ESTIMATE, topics.COMMAND, topics.SLIDING)

@@ -50,6 +50,7 @@ def test_the_page(tmp_path: Path) -> None:
         ("/rig/config", STRING, T0 + 1, text(rig.to_yaml())),
         ("/rig/setup", STRING, T0, text("node: controller\nparameters: {pole: 10.0}\n")),
         ("/rig/setup", STRING, T0 + 10**8, text("node: controller\nparameters: {pole: 20.0}\n")),
+        ("/rig/calibration", STRING, T0, text("sprung_front: {slope: -0.0270281}\n")),
         event(T0 + 2 * 10**8, 2, "trip_pressure", "<b>too high</b>"),
         event(T0 + 5 * 10**8, 0, "session_complete", "the session's duration has passed"),
     ]
@@ -63,7 +64,16 @@ def test_the_page(tmp_path: Path) -> None:
     assert not parser.open and all(r.startswith("data:image/png;base64,") for r in parser.references)
     assert "http" not in re.sub(r"base64,[^\"]+", "", html)
     assert html.index("trip_pressure") < html.index("The ride") and "&lt;b&gt;too high" in html
-    for words in ("pole 20.0", "changed", "session_complete", "51.5", "50.33", "inlets saturated", "/valve/command"):
+    for words in (
+        "pole 20.0",
+        "changed",
+        "session_complete",
+        "51.5",
+        "50.33",
+        "inlets saturated",
+        "/valve/command",
+        "-0.0270281",
+    ):
         assert words in html, words
     assert "--bad)" in html.split("border-left")[1][:40]
 

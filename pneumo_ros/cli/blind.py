@@ -31,6 +31,7 @@ def make(
     workers: Workers = 1,
     scheduler: Scheduler = "",
     only: Only = "",
+    first: Annotated[int, typer.Option(help="Only the first N cases; their order is shuffled. 0: all.", min=0)] = 0,
 ) -> None:
     """Draw the cases of a set, write their logs, seal their labels.
 
@@ -39,7 +40,7 @@ def make(
     from pneumo_ros.cli.blind_work import make_case
     from pneumo_ros.twin.plan import plan
 
-    cases = [case for case in plan(set_name) if only in case.name]
+    cases = [case for case in plan(set_name) if only in case.name][: first or None]
     items = [(case, str(folder)) for case in cases]
     _run("making", make_case, items, [case.name for case in cases], workers, scheduler)
     seal_set(folder, set_name, [case.name for case in cases])

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from pneumo_ros.parameters import Value
+    from pneumo_ros.road import Road
 
 app = typer.Typer()
 
@@ -61,17 +67,17 @@ def emulate(
         signal.signal(number, lambda *_: emulator.stop())
     simulation.warm_up()
     prefer_this_process()
-    console.print(
-        f"emulating the rig on {link}; try: pneumo run --source serial --port {link} --calibration {calibration}"
-    )
+    console.print(f"emulating the rig on {link}; Ctrl-C ends it; try", soft_wrap=True)
+    console.print(f"  pneumo run --source serial --port {link} --calibration {calibration}", soft_wrap=True)
     done = emulator.run(duration)
     if record is not None:
         done.save(record)
 
 
-def _road(road: str, speed: float, seed: int, wheelbase: float):  # type: ignore[no-untyped-def]
+def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
     from pneumo_ros.road import build_road
 
+    values: dict[str, Value]
     if len(road) == 1:
         values = {"kind": "iso", "iso_class": road.upper()}
     elif road.lower().endswith(".csv"):
@@ -81,7 +87,7 @@ def _road(road: str, speed: float, seed: int, wheelbase: float):  # type: ignore
     return build_road({**values, "speed_kmh": speed, "seed": seed}, wheelbase=wheelbase, where="--road")
 
 
-def _show_faults(console) -> None:  # type: ignore[no-untyped-def]
+def _show_faults(console: Console) -> None:
     from pneumo_ros.daq.faults import DEFAULTS, MEANING, PULSES
 
     for kind, options in DEFAULTS.items():

@@ -178,6 +178,8 @@ def _show_settings(report: Report) -> None:
         known.update(new)
         shown = ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != "")
         table.add_row(f"{setup.node}, {setup.time_ns / 1e9:.3f} s", word, shown)
+    for time_ns, calibration in report.calibrations:
+        table.add_row(f"calibration, {time_ns / 1e9:.3f} s", "", _short(" ".join(calibration.split())))
     for name, size in report.attachments:
         table.add_row("attachment", name, f"{size} bytes")
     console.print(table)

@@ -20,7 +20,7 @@ VERBS: dict[str, str] = {
     "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
-    "log": "Look into a session log: info, validate, recover, export, compare.",
+    "log": "Look into a session log: info, validate, recover, export, compare, report.",
     "view": "Show a session in the browser: a log played back, or a running session.",
     "emulate": "Open a pseudo-terminal that behaves like the rig, with faults to inject.",
     "calibrate": "Fit a sensor's calibration from points, or check what is in force.",

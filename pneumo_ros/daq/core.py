@@ -10,14 +10,15 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 
 from pneumo_ros.daq.actuation import SECOND, Actuation, Mode
+from pneumo_ros.daq.admission import admit
 from pneumo_ros.daq.calibration import Calibration
 from pneumo_ros.daq.calibration_check import check_calibration
+from pneumo_ros.daq.clock import DeviceClock
 from pneumo_ros.daq.findings import Findings
 from pneumo_ros.daq.frames import DeviceFault, DeviceState, Hello, HelloRequest, Sample, SampleFlag, Status, encode
 from pneumo_ros.daq.intake import Intake, Measurement
 from pneumo_ros.daq.reasons import Event, Finding, Level, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig
-from pneumo_ros.daq.scaling import check_map, output_scale
 from pneumo_ros.daq.stream import StreamDecoder
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.air_spring import effective_area, load_surface
@@ -29,6 +30,7 @@ SILENT_FOR = SECOND // 2  # of silence after which the handshake starts again
 WINDOW = SECOND  # over which lost frames are judged
 MIN_WINDOW_FRAMES = 100
 COMPLAINT_EVERY = SECOND  # between events about refused commands
+CLOCK_KEPT = 60 * SECOND  # without samples, after which the drift learnt before is too old
 UNWATCHED = SECOND // 10  # without a tick, after which no command passes: nobody is watching the timeouts
 
 
@@ -153,14 +155,14 @@ class DriverCore:
     def _meet(self, hello: Hello, now: int) -> None:
         """The answer to our handshake: take the board or refuse it."""
         try:
-            check_map(hello)
-            scale = output_scale(self.calibration, hello)
-            self._check_board(hello, scale.counts(self.safety.safe_command))
+            scale = admit(hello, self.calibration, self.safety)
         except InputError as error:
             self.phase = Phase.REFUSED
             self._finding_event(Finding(Reason.BOARD_REFUSED, "board", str(error)), now)
             return
-        self.intake = Intake(hello, self.calibration, self.safety, self.rig, self._surface)
+        self.intake = Intake(
+            hello, self.calibration, self.safety, self.rig, self._surface, self._known_clock(hello, now)
+        )
         self.actuation.board(scale)
         self.phase, self.status, self.last = Phase.RUNNING, None, None
         self._last_sample, self._silent = now, False
@@ -172,20 +174,13 @@ class DriverCore:
         self.event(Level.OK, Reason.LINK_OPEN, f"board {hello.serial_number}, firmware {firmware}", values, now)
         self._say_doubts(hello, now)
 
-    def _check_board(self, hello: Hello, safe: tuple[int, ...]) -> None:
-        limit = round(self.safety.timeouts.firmware * 1e6)
-        if hello.watchdog_us + hello.sample_period_us > limit:
-            raise InputError(
-                "the board's watchdog is too slow", where=f"board {hello.serial_number}",
-                value=hello.watchdog_us + hello.sample_period_us, allowed=f"at most {limit} us with a sample period",
-                remedy="build the firmware with a shorter watchdog",
-            )  # fmt: skip
-        theirs = tuple(entry.safe for entry in hello.outputs)
-        if theirs != safe:
-            raise InputError(
-                "the board has another safe state than config/safety.yaml", where=f"board {hello.serial_number}",
-                value=theirs, allowed=str(safe), remedy="make safe_command and the firmware agree",
-            )  # fmt: skip
+    def _known_clock(self, hello: Hello, now: int) -> DeviceClock | None:
+        """The clock as learnt before, if this board has run on since: late frames after a stall keep right stamps."""
+        before = self.intake
+        if before is None or now - self._last_sample > CLOCK_KEPT:
+            return None
+        same = (hello.serial_number, hello.boot_id) == (before.hello.serial_number, before.hello.boot_id)
+        return before.clock if same else None
 
     def _say_doubts(self, hello: Hello, now: int) -> None:
         assert self.intake is not None

@@ -41,7 +41,7 @@ MEANING = {
     "jitter": "frames to the host are held back at random (ms: at most)",
     "disconnect": "the port vanishes; it comes back after the duration, 1 s by default",
     "silent": "the board stops sending (deaf=1: and listening)",
-    "drift": "the board's clock runs fast (ppm)",
+    "drift": "the board's clock runs fast, from boot on (ppm)",
     "reset": "the board restarts with closed valves and another boot id",
     "estop": "the hardware e-stop is pressed",
     "converter": "the converter does not answer",

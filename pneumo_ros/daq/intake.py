@@ -52,13 +52,20 @@ class Intake:
     hello : the board
     calibration, safety, rig : configuration
     surface : effective area, already loaded: nothing may wait once the samples come
+    clock : of this board as learnt before, if it has run on since
     """
 
     def __init__(
-        self, hello: Hello, calibration: Calibration, safety: SafetyConfig, rig: Rig, surface: AreaSurface
+        self,
+        hello: Hello,
+        calibration: Calibration,
+        safety: SafetyConfig,
+        rig: Rig,
+        surface: AreaSurface,
+        clock: DeviceClock | None = None,
     ) -> None:
         self.hello, self.rig, self._safety, self._surface = hello, rig, safety, surface
-        self.clock = DeviceClock()
+        self.clock = clock or DeviceClock()
         self.limits = LimitMonitor(safety.limits)
         self.samples = self.lost = self.out_of_step = 0
         self.recent_loss = 0.0  # share of frames lost, exponentially forgotten

@@ -19,6 +19,7 @@ from pneumo_ros.session.topics import JOINT, Topic
 Level = Literal["ok", "note", "warning", "error"]
 
 # Physically possible ranges, wide enough for any rig of this kind: what lies outside is a wrong unit or a bad sensor.
+_OUT_OF_ORDER = 0.1  # s; a safe command sent in between may carry a later stamp than the command that follows it
 _HEIGHT = 0.5  # m; the springs work within 0.06 m
 _LOWEST_PRESSURE = 50e3  # Pa absolute; a gauge reading in Pa of a slack spring would pass, one in psi or bar cannot
 _SUPPLY_MARGIN = 1.5  # spring pressure over supply pressure
@@ -163,7 +164,9 @@ def _range(topic: Topic, rig: Rig) -> tuple[float, float, str]:
 def _stamps_sound(stamps: NDArray[np.int64], logged: NDArray[np.int64]) -> Iterator[tuple[Level, str]]:
     timing: Timing = measure_timing(stamps, logged)
     if timing.backward:
-        yield "error", f"{timing.backward} stamps run backwards"
+        worst = float(-np.diff(stamps).min()) * 1e-9
+        text = f"{timing.backward} stamps run backwards, by {worst:.4g} s at most"
+        yield ("error" if worst > _OUT_OF_ORDER else "warning"), text
     if timing.repeated:
         yield "warning", f"{timing.repeated} stamps are equal to their predecessor"
     if timing.jumps:

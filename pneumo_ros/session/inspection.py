@@ -117,6 +117,7 @@ class Report:
     changed_parameters: dict[str, tuple[float, float]]
     metadata: tuple[tuple[str, dict[str, str]], ...]
     setups: tuple[Setup, ...]
+    calibrations: tuple[tuple[int, str], ...]
     events: tuple[Event, ...]
     attachments: tuple[tuple[str, int], ...]
 
@@ -157,6 +158,7 @@ def inspect_log(log: Log) -> Report:
         changed_parameters=_changed(log),
         metadata=tuple((m.name, dict(m.metadata)) for m in log.metadata),
         setups=tuple(read_setups(log)),
+        calibrations=tuple(read_calibrations(log)),
         events=tuple(read_events(log)),
         attachments=tuple((a.name, len(a.data)) for a in log.attachments),
     )
@@ -226,6 +228,13 @@ def read_setups(log: Log) -> Iterator[Setup]:
             rest = {str(k): v for k, v in document.items() if k not in ("node", "time_ns", "parameters")}
             given = document.get("parameters")
             yield Setup(time_ns, str(document["node"]), {**(given if isinstance(given, Mapping) else {}), **rest})
+
+
+def read_calibrations(log: Log) -> Iterator[tuple[int, str]]:
+    """(log time in ns, YAML) of each calibration that was in force, in log order."""
+    name = topics.CALIBRATION.name
+    if name in log.topics and log.topics[name].type == topics.CALIBRATION.type:
+        yield from ((time_ns, message.data) for time_ns, message in log.messages(name))
 
 
 def read_events(log: Log) -> Iterator[Event]:

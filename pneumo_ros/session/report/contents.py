@@ -59,6 +59,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "loop": loop_rows(ours),
         "topics": [topic_row(topic) for topic in report.topics],
         "events": [_event_row(event, report) for event in report.events],
+        "calibrations": [(f"{time_ns / 1e9:.3f}", text) for time_ns, text in report.calibrations],
         "setups": list(setup_rows(report.setups)),
         "rig": [(name, f"{nominal:g}", f"{value:g}") for name, (nominal, value) in report.changed_parameters.items()],
         "rig_name": report.rig or "not in the log",
