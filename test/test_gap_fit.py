@@ -16,7 +16,7 @@ from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, to
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.rig_model import RigModel
-from pneumo_ros.gap.screen import all_parts, promises, trials
+from pneumo_ros.gap.screen import all_parts, promises, trials, visibility
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.plant.trim import trim
@@ -154,3 +154,18 @@ def test_bootstrap_interval_holds_the_shrink(model: RigModel) -> None:
     refit, best = record.measured + error, record.measured + 0.25 * error
     low, high = bootstrap_shrink(record, refit, best)
     assert low <= 0.75 <= high and high - low < 0.05
+
+
+def test_a_rig_at_rest_shows_hardly_any_effect(model: RigModel) -> None:
+    road, commands = np.zeros((1500, 2)), np.tile(trim(model.rig).command, (1500, 1))
+    clean = model.simulate(driven(road, commands), initial=trim(model.rig).state)
+    problem = Problem(model, (signals_of(clean, road, commands, 3),))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=2)
+    still = visibility(problem, refit, trials(problem, refit, all_parts(problem)))
+    problem = Problem(model, (log(model, 1),))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=2)
+    driven_rig = visibility(problem, refit, trials(problem, refit, all_parts(problem)))
+    for effect in ("coulomb_friction", "valve_lag", "tyre_damping", "exciter_lag", "pressure_lag", "bump_stop"):
+        assert still[effect] < 0.5
+    for effect in ("coulomb_friction", "valve_lag", "tyre_damping", "leak", "supply_droop"):
+        assert driven_rig[effect] > 1.0

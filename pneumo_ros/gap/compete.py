@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.problem import Candidate, Part, Problem
-from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials
+from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
 
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
@@ -54,6 +54,7 @@ class Contest:
     singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
     promised : screening of the singles at the refit, for the report
     lost : labels of candidates whose fit diverged
+    visible : effect id -> rms in sigmas that its typical size would move the outputs by
     """
 
     problem: Problem
@@ -64,6 +65,7 @@ class Contest:
     pairs: list[Fit] = field(default_factory=list)
     promised: list[Promise] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
+    visible: dict[str, float] = field(default_factory=dict)
 
     @property
     def finalists(self) -> list[Fit]:
@@ -109,6 +111,7 @@ def _run_singles(contest: Contest) -> None:
     contest.progress(0.05, "screening effects")
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
+    contest.visible = visibility(problem, contest.refit, found)
     short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles, 3), (0.1, 0.4))
     ended = [_finish(problem, one, effort, k < STARTED_TWICE) for k, one in enumerate(short[: effort.finalists])]
     contest.singles = _by_cost(ended) + short[effort.finalists :]

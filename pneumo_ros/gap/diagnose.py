@@ -40,6 +40,8 @@ class Whereabouts:
 
 
 Locate = Callable[[Any, Sequence[Any], Any, Array, Sequence[Active]], Whereabouts]
+SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
+MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
 
 
@@ -165,8 +167,10 @@ def _report(
     notes += _notes(contest, best, problem)
     cov = covariance(problem, best)
     tell(1.0, "done")
+    hidden = _hidden(problem, contest)
+    blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)
     return Diagnosis(
-        verdict=opinion.verdict,
+        verdict="not_testable" if blind else opinion.verdict,
         probability=opinion.probability,
         location=tuple(location),
         ranking=tuple(ranking),
@@ -174,6 +178,7 @@ def _report(
         gap=_gap(model, holdout, runs),
         nuisance=nuisance_estimates(problem, best, cov),
         active=active,
+        not_testable=hidden,
         experiment=experiment,
         edit=None if edit is None else edit_test(problem, edit, base, best),
         notes=tuple(notes),
@@ -317,6 +322,16 @@ def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:
         if best.x[m] in (low[m], high[m]):
             notes.append(f"{p.name} stands at the edge of its tolerance")
     return notes
+
+
+def _hidden(problem: Problem, contest: Contest) -> dict[str, str]:
+    """Effects that this excitation could not have shown, with how little their typical size would have moved."""
+    out = {}
+    for name, moved in contest.visible.items():
+        if moved < SEEN:
+            sizes = [f"{p.name} {p.typical:.3g} {p.unit}" for p in problem.model.effects[name].parameters if p.size]
+            out[name] = f"{' or '.join(sizes)} would have moved the outputs by {moved:.2g} sigma only"
+    return out
 
 
 def _trajectories(holdout: Any, runs: Mapping[str, HeldOut]) -> dict[str, Array]:

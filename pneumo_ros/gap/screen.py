@@ -97,6 +97,20 @@ def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = 
     return list(merged.values())
 
 
+def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str, float]:
+    """Effect id -> how far its typical size would move the outputs, nuisance parameters answered: rms in sigmas.
+
+    The largest over its sites and starts; 0 where no trial moved anything. What is far below one could not have been
+    seen.
+    """
+    gram, _, _ = _projected(problem, base, found, held=False)
+    count = float(np.count_nonzero(problem.weight[problem.fitted]))
+    out = dict.fromkeys(problem.model.effects, 0.0)
+    for trial, square in zip(found, np.diag(gram), strict=True):
+        out[trial.part[0]] = max(out[trial.part[0]], float(np.sqrt(max(square, 0.0) / count)))
+    return out
+
+
 def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool) -> list[Promise]:
     gram, with_residual, total = _projected(problem, base, found, held)
     best: dict[tuple[Part, ...], Promise] = {}
