@@ -213,9 +213,7 @@ KILLED_DRIVER = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-from serial_rig import Loop, SerialRig, Truth
-
-pytestmark = pytest.mark.realtime
+from serial_rig import Loop, SerialRig
 rig = SerialRig(Path(sys.argv[1]), loop=Loop())
 rig.driver.open()
 rig.arm()
