@@ -19,6 +19,7 @@ SOURCES = {"sim": "plant", "serial": "daq"}
 ARGUMENTS = {
     "source": ("sim", "sim: the simulated rig; serial: the hardware"),
     "port": ("/dev/ttyACM0", "serial port of the hardware"),
+    "calibration": ("appendix_c", "of the hardware: name in config/calibration, or a YAML file"),
     "config": ("", "parameter file; config/session.yaml by default"),
     "mode": ("", "lockstep or realtime; empty: lockstep for sim, realtime for serial"),
     "output": ("", "log to write; sessions/<time>/session.mcap by default"),
@@ -33,7 +34,7 @@ def nodes(context: LaunchContext) -> list[object]:
     mode = given["mode"] or ("lockstep" if source == "plant" else "realtime")
     names = ["road_profile", source, "estimator", "controller", "session_recorder"]
     common = {"mode": mode, "session_nodes": ",".join(names)}
-    own = {"session_recorder": {"output": output}, "daq": {"port": given["port"]}}
+    own = {"session_recorder": {"output": output}, "daq": {"port": given["port"], "calibration": given["calibration"]}}
     config = given["config"] or str(share_file("config", "session.yaml"))
     made = {
         name: Node(

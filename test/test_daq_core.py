@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 import random
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,116 +13,18 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulated_rig import MS, RIG, SAFE, START, Bench
 
 from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.daq.board import board_identity
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import DriverCore, Phase
 from pneumo_ros.daq.device import Device
-from pneumo_ros.daq.frames import DeviceState, Hello, OutputRange, encode
+from pneumo_ros.daq.frames import DeviceState, OutputRange, encode
 from pneumo_ros.daq.intake import Measurement
 from pneumo_ros.daq.limits import MEASURED, LimitMonitor
-from pneumo_ros.daq.reasons import Event, Reason
-from pneumo_ros.daq.safety_config import Limit, SafetyConfig, load_safety
-from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
-from pneumo_ros.rig import load_rig
-from pneumo_ros.road import build_road
-
-MS = 1_000_000  # ns
-START = 5_000_000_000
-RIG = load_rig()
-ROAD = build_road({"kind": "flat"}, wheelbase=RIG.wheelbase)
-SAFE = (0, 0, 0, 0)
-
-
-class Bench:
-    """A driver core and a board on one simulated clock, 1 ms a step, a controller at 500 Hz."""
-
-    def __init__(
-        self,
-        hello: Hello | None = None,
-        calibration: str = "appendix_c_corrected",
-        safety: SafetyConfig | None = None,
-    ) -> None:
-        self.now, self.rows = START, 0
-        self.hello = hello or board_identity()
-        lines = load_calibration(calibration)
-        self.simulation = RigSimulation(RIG, ROAD, board_identity(), lines, SimulationSettings())
-        self.to_host, self.to_board = bytearray(), bytearray()
-        self.outputs: list[tuple[int, tuple[int, ...]]] = []
-        self.core = DriverCore(safety or load_safety(), lines, RIG, self.to_board.extend)
-        self.events: list[Event] = []
-        self.measurements: list[Measurement] = []
-        self.controller: Callable[[Measurement], None] | None = None
-        self.spoil: Callable[[list[int]], None] = lambda counts: None
-        self.up: Callable[[bytes], bytes] = lambda data: data
-        self.down: Callable[[bytes], bytes] = lambda data: data
-        self.pressed = self.converter_fails = False
-        self.boot()
-        self.core.opened(self.now)
-
-    def boot(self) -> None:
-        self.device = Device(self.hello, self.to_host.extend, self._write)
-        self.device.boot(self.us)
-
-    @property
-    def us(self) -> int:
-        return (self.now - START) // 1000 % 2**32
-
-    def _write(self, counts: tuple[int, ...]) -> None:
-        self.simulation.write_outputs(counts)
-        self.outputs.append((self.now, counts))
-
-    def run(self, milliseconds: int) -> Bench:
-        for _ in range(milliseconds):
-            self.now += MS
-            self.simulation.advance()
-            counts = list(self.simulation.convert(self.simulation.values()))
-            self.spoil(counts)
-            self.device.tick(self.us, None if self.converter_fails else tuple(counts), self.pressed)
-            self.core.receive(self.up(bytes(self.to_host)), self.now + MS // 10)
-            self.to_host.clear()
-            self.core.tick(self.now + MS // 5)
-            self._take()
-            self.device.receive(self.down(bytes(self.to_board)), self.us)
-            self.to_board.clear()
-        return self
-
-    def _take(self) -> None:
-        for item in self.core.drain():
-            if isinstance(item, Event):
-                self.events.append(item)
-                continue
-            self.measurements.append(item)
-            if self.controller and item.usable and item.sequence % 2 == 0:
-                self.controller(item)
-
-    def hold_trim(self, item: Measurement) -> None:
-        self.core.command(self.simulation.trim.command.tolist(), item.stamp_ns, self.now)
-
-    def armed(self) -> Bench:
-        self.controller = self.hold_trim
-        self.run(700)
-        assert self.core.arm(self.now) == []
-        self.run(300)
-        assert self.core.mode is Mode.ARMED and self.device.state is DeviceState.ARMED
-        return self
-
-    def reasons(self) -> list[Reason]:
-        return [event.reason for event in self.events]
-
-    def safe_after(self, start: int) -> float:
-        """ms from ``start`` until the outputs became safe for good."""
-        last_driven = max((when for when, counts in self.outputs if counts != SAFE), default=0)
-        first_safe = min(when for when, counts in self.outputs if counts == SAFE and when >= last_driven)
-        return (first_safe - start) / MS
-
-    def refuses_to_move_until_armed(self) -> None:
-        """The controller goes on, nothing reaches the valves."""
-        before = len(self.outputs)
-        self.run(1500)
-        assert self.core.mode is not Mode.ARMED
-        assert all(counts == SAFE for _, counts in self.outputs[before:])
+from pneumo_ros.daq.reasons import Reason
+from pneumo_ros.daq.safety_config import Limit, load_safety
 
 
 def test_handshake_arming_and_a_bumpless_start() -> None:
@@ -418,3 +322,16 @@ def test_every_reason_is_documented() -> None:
     page = (Path(__file__).resolve().parent.parent / "docs" / "hardware.md").read_text(encoding="utf-8")
     for reason in Reason:
         assert f"| `{reason.code}` | {reason.value} |" in page
+
+
+@pytest.mark.slow
+def test_the_ride_through_frames_and_converters_is_the_plants(capsys: pytest.CaptureFixture[str]) -> None:
+    """Within 5 %, on a simulated clock: what the line's form and the converters cost, without what a computer adds."""
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
+    from serial_loop import compare, reference, simulated
+    from serial_rig import CALIBRATION, Loop
+
+    loop = Loop()
+    options = argparse.Namespace(duration=15.0, seed=1, calibration=CALIBRATION, adc_bits=16)
+    assert compare(simulated(options, loop), reference(15.0, 1, loop)) < 0.05
+    assert "mode armed, lost frames 0, refused commands 0" in capsys.readouterr().out

@@ -33,6 +33,8 @@ from std_srvs.srv import Trigger
 from pneumo_ros.daq.calibration import SENSORS
 from pneumo_ros.daq.calibration_file import parse_calibration
 from pneumo_ros.errors import InputError
+from pneumo_ros.nodes.controller import ControllerNode
+from pneumo_ros.session import topics
 from pneumo_ros.session.reading import Log, read_log
 
 RATE = 250  # Hz; five processes of a session and the emulator share the cores with everything else
@@ -242,6 +244,41 @@ def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
             node.terminate()
             node.wait(20)
     assert json.dumps(yaml.safe_load(saved.read_text())["calibration"]["sensors"]["sprung_front"])
+
+
+def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
+    """The first watchdog, on monotonic time: within 50 ms of the last estimate the valves are asked to close."""
+    context = Context()
+    rclpy.init(context=context, domain_id=sessions.own_domain())
+    executor = SingleThreadedExecutor(context=context)
+    try:
+        node = ControllerNode(context, {"mode": "realtime", "session_nodes": "controller"})
+        other = rclpy.create_node("other", context=context)
+        commands: list[tuple[float, list[float]]] = []
+        other.create_subscription(
+            JointState, "/valve/command", lambda m: commands.append((time.monotonic(), list(m.position))), 100
+        )
+        send = other.create_publisher(JointState, "/estimate/state", 10)
+        for each in (node, other):
+            executor.add_node(each)
+        rest = {"front_height": 0.04572, "rear_height": 0.04572, "front_pressure": 2.77e5, "rear_pressure": 4.29e5,
+                "front_area": 1.07e-3, "rear_area": 9.3e-4}  # fmt: skip
+        message = JointState(name=list(topics.ESTIMATE.names))
+        message.position = [rest.get(name, 0.0) for name in message.name]
+        last, end = 0.0, time.monotonic() + 1.0
+        while time.monotonic() < end:
+            if time.monotonic() < end - 0.3:
+                message.header.stamp = other.get_clock().now().to_msg()
+                send.publish(message)
+                last = time.monotonic()
+            executor.spin_once(timeout_sec=0.002)
+        before = [areas for when, areas in commands if when <= last]
+        closed = [when for when, areas in commands if when > last and areas == [0.0] * 4]
+        assert before and max(before[-1]) > 0.0
+        assert len(closed) > 10 and closed[0] - last < 0.05 + (closed[1] - closed[0])
+    finally:
+        executor.shutdown()
+        context.try_shutdown()
 
 
 @pytest.mark.parametrize(

@@ -8,14 +8,17 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
+import sessions
 from browser import browser
 from test_log_tools import contract_log
 from test_reading import write
@@ -57,7 +60,10 @@ def served(*arguments: str, module: str = "pneumo_ros.cli.view") -> Iterator[tup
         raise AssertionError("".join(said))
     finally:
         process.send_signal(signal.SIGINT)
-        process.wait(20)
+        try:
+            process.wait(20)
+        finally:
+            process.kill()
 
 
 @pytest.fixture(scope="module")
@@ -165,13 +171,25 @@ def test_a_log_plays_in_the_browser(log_path: Path) -> None:
         assert "a.mcap" in tab.driver.title
 
 
+def line_with(words: str, stream: IO[str], seconds: float) -> bool:
+    """Whether a line with these words comes in time."""
+    found = threading.Event()
+
+    def look() -> None:
+        if any(words in line for line in stream):
+            found.set()
+
+    threading.Thread(target=look, daemon=True).start()
+    return found.wait(seconds)
+
+
 @pytest.mark.slow
 def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
     """One real session: the red button closes the valves, a gain changes, and the page stays when the session ends."""
     pytest.importorskip("rclpy")
     path = tmp_path / "session.mcap"
-    domain = str(100 + os.getpid() % 100)
-    command = ("run", "--view", "--single-process", "--duration", "15", "--no-picture", "--domain-id", domain,
+    domain = str(sessions.own_domain())
+    command = ("run", "--view", "--single-process", "--duration", "300", "--no-picture", "--domain-id", domain,
                "--output", str(path))  # fmt: skip
     with served(*command, module="pneumo_ros.cli.main") as (url, process), browser() as tab:
         tab.open(url)
@@ -181,10 +199,11 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.wait(lambda: tab.model("set-controller-pole", "value"), "the gains")
         tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
         tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
-        tab.wait(lambda: ">ended<" in tab.model("status", "text"), "the session's end", 60)
+        os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)
+        tab.wait(lambda: "nothing heard" in tab.model("status", "text"), "the session's end", 60)
         tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
         assert process.poll() is None and process.stdout is not None
-        assert any("the dashboard stays" in line for line in process.stdout)
+        assert line_with("the dashboard stays", process.stdout, 60.0)
     log = read_log(path)
     codes = [event.code for event in read_events(log)]
     assert "estop" in codes and "parameter_changed" in codes

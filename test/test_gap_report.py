@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def test_the_page_is_whole_and_refers_to_nothing_outside() -> None:
 def test_the_page_says_verdict_place_size_and_shrink() -> None:
     page = render(findings())
     assert "At the front, the spring leaks." in page and "sure: 97 %" in page
-    assert "by 98 % (90 % interval 96 % to 99 %)" in page
+    assert "by 98 % (90 % interval 96 % to 99.0 %)" in page
     assert "the front air and valve" in page and "93 %" in page
     assert "0.4100 ± 0.0020" in page and "mm²" in page
     assert "orifice_coefficient: an orifice" in page
@@ -109,6 +110,12 @@ def test_the_page_says_verdict_place_size_and_shrink() -> None:
 def test_every_kind_of_verdict_has_its_sentence(verdict: str, said: str) -> None:
     assert said in headline(findings(verdict).summary, {})
     assert said in render(findings(verdict))
+
+
+def test_an_unknown_cause_shows_how_far_its_place_reaches() -> None:
+    page = render(replace(findings("unknown"), mended=0.0123))
+    assert "that place mended freely" in page and ">0.0123<" in page
+    assert "that place mended freely" not in render(findings("unknown"))
 
 
 def test_a_pair_is_named_with_both_effects() -> None:

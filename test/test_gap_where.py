@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_logs import channels_of, excitation, signals_of, simulated, topics_of_channels
+from rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
 from pneumo_ros.gap.model import Active
@@ -185,9 +185,8 @@ def test_channels_that_are_not_there_do_no_harm(model: RigModel, lost: tuple[str
     logs = []
     for seed in (4, 5):
         clean, road, commands = simulated(6.0, seed)
-        full = topics_of_channels(
-            model.simulate(signals_of(clean, road, commands, seed), active=active), road, commands
-        )
+        channels = model.simulate(signals_of(clean, road, commands, seed), active=active)
+        full = topics_of_channels(noisy(channels, seed), road, commands)
         logs.append(prepare({name: without(data, name, lost) for name, data in full.items()}, load_rig()))
     location = locate(model, [logs[0]], logs[1])
     assert all(np.isfinite(value) for value in location.level.values())

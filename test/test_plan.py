@@ -101,3 +101,17 @@ def test_a_node_refuses_a_bad_parameter_on_its_own(node: str) -> None:
     )  # fmt: skip
     assert result.returncode == 2
     assert "rate_hz" in result.stderr and len(result.stderr.strip().splitlines()) == 1
+
+
+def test_every_preset_is_made_of_parameters_the_nodes_have() -> None:
+    from pneumo_ros.cli.run import _controller_options, node_tables
+    from pneumo_ros.control.presets import PRESETS
+    from pneumo_ros.session.plan import assign
+
+    tables = node_tables()
+    for name in PRESETS:
+        values = {node: {} for node in tables}
+        for node, key, raw in _controller_options(name):
+            assign(values, tables, node, key, raw, name)
+        assert "controller" in values["controller"]
+    assert values["estimator"]["known_surface"] is True, "the last preset uses the known surface"

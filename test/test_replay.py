@@ -309,9 +309,12 @@ def test_live_replay_from_the_command_line(recorded: Log) -> None:
     ours, theirs = pty.openpty()
     command = [sys.executable, "-m", "pneumo_ros.cli.main", "replay", str(recorded.path), "--paused"]
     process = subprocess.Popen([*command, "--domain-id", str(own_domain())], stdin=theirs, stdout=subprocess.PIPE)
-    assert process.stdout is not None and b"space: pause" in process.stdout.readline()
-    for key in (b".", b"+", b";", b" ", b"q"):
-        os.write(ours, key)
-    assert process.wait(30) == 0
+    try:
+        assert process.stdout is not None and b"space: pause" in process.stdout.readline()
+        for key in (b".", b"+", b";", b" ", b"q"):
+            os.write(ours, key)
+        assert process.wait(30) == 0
+    finally:
+        process.kill()
     os.close(ours)
     os.close(theirs)

@@ -102,12 +102,24 @@ def test_linearised_loops_say_which_controllers_can_ride_well(settings: ThesisSe
 
 
 def test_two_valve_beats_the_thesis_by_30_percent_on_every_road(ahead: dict) -> None:
-    """Same valves, same uncertainties, the rig's sensors; tyre load no worse; a delay of one period changes nothing."""
-    for name in ("two_valve", "two_valve, one period late"):
-        assert min(beyond.reductions(ahead[name], ahead["thesis"])) >= 0.30
-        assert ahead[name].tyre_variation <= ahead["thesis"].tyre_variation
-    assert min(beyond.reductions(ahead["two_valve"], ahead["default"])) >= 0.15
+    """Same valves, same uncertainties, the rig's sensors; tyre load no worse; so with all commands a period late."""
+    for late in ("", beyond.LATE):
+        two, thesis = ahead[f"two_valve{late}"], ahead[f"thesis{late}"]
+        assert min(beyond.reductions(two, thesis)) >= 0.30
+        assert two.tyre_variation <= thesis.tyre_variation
+    assert min(beyond.reductions(ahead["two_valve"], ahead["default"])) >= 0.20
     assert min(beyond.reductions(ahead["area_rate_feedforward"], ahead["thesis"])) >= 0.10
+
+
+def test_controllers_hold_when_the_rig_is_off_by_three_tolerances(settings: ThesisSettings) -> None:
+    """Default at least 45 % and two_valve at least 60 % under passive, for every parameter and either sign."""
+    few = replace(settings, seeds=1)
+    for case in beyond.perturbations().values():
+        passive, default, two = (
+            measure((few, HalfExperiment(name, {}, chapter6_half.VOLUME, height_error_in=0.2, off=case))).heave_rms
+            for name in ("passive", "default", "two_valve")
+        )
+        assert default < 0.55 * passive and two < 0.40 * passive, case
 
 
 def test_known_surface_estimates_areas_to_two_percent(ahead: dict) -> None:
@@ -149,6 +161,7 @@ def test_every_claim_gets_exactly_one_verdict(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(module, "POLES", (5.0, 10.0, 20.0))
         monkeypatch.setattr(module, "AREAS_IN2", (5.0, 6.0))
     monkeypatch.setattr(chapter6, "CHECK_TIME", 60.0)
+    monkeypatch.setattr(beyond, "perturbations", dict)
     monkeypatch.setattr(robustness, "VARIATIONS", {"as stated": {}})
     small = replace(load_settings(), seeds=1, duration=5.0)
     announced: list[str] = []

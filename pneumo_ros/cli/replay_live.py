@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import sys
 import termios
@@ -80,7 +81,8 @@ def _on_key(player: Player, keys: Any) -> bool:
     """Act on a pressed key; True to end."""
     if not select.select([keys], [], [], 0)[0]:
         return False
-    key, transport = keys.read(1), player.transport
+    # Past the text layer, which would take further keys into a buffer that select() does not see.
+    key, transport = os.read(keys.fileno(), 1).decode("ascii", "ignore"), player.transport
     wall = time.monotonic_ns()
     if key == " ":
         transport.pause(wall, not transport.paused)
@@ -90,4 +92,4 @@ def _on_key(player: Player, keys: Any) -> bool:
         player.seek(player.position + (1.0 if key == ";" else -1.0))
     elif key in "+-":
         transport.set_rate(wall, transport.rate * (2.0 if key == "+" else 0.5))
-    return bool(key == "q")
+    return key == "q"

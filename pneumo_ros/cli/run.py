@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 FAILED = 1
-ALIASES = {"smflc": "first_order_smflc"}
+ALIASES = {"smflc": "default"}
 ROAD_CLASSES = "ABCDEFGH"
 RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
@@ -31,7 +31,12 @@ def run(
     road: Annotated[str, typer.Option(help="ISO class A-H, or sine, sweep, step, bump, flat, or a CSV file.")] = "D",
     duration: Annotated[float, typer.Option(help="Length of the session, s.")] = 20.0,
     speed: Annotated[float, typer.Option(help="Full-scale speed, km/h.")] = 80.0,
-    controller: Annotated[str, typer.Option(help="smflc, passive, or another of docs/parameters.md.")] = "smflc",
+    controller: Annotated[
+        str,
+        typer.Option(
+            help="smflc, passive, thesis, two_valve, area_rate_feedforward, or another of docs/parameters.md."
+        ),
+    ] = "smflc",
     seed: Annotated[int, typer.Option(help="Seed of road and sensor noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Control rate, Hz.")] = 500.0,
     source: Annotated[str, typer.Option(help="sim: the simulated rig; serial: the hardware.")] = "sim",
@@ -117,9 +122,23 @@ def _options(
         ("**", "session_nodes", ",".join(session_nodes(source))),
         (RIG_NODES[source], "duration", duration),
         (RIG_NODES[source], "report_progress", True),
-        ("controller", "controller", ALIASES.get(controller, controller)),
+        *_controller_options(ALIASES.get(controller, controller)),
         ("**", "rate_hz", rate),
         ("**", "mode", "realtime" if realtime or source == "serial" else "lockstep"),
+    ]
+
+
+def _controller_options(name: str) -> list[tuple[str, str, Any]]:
+    """A preset's values for estimator and controller, or a member of the controller family with its defaults."""
+    from pneumo_ros.control.presets import PRESETS
+
+    if name not in PRESETS:
+        return [("controller", "controller", name)]
+    preset = PRESETS[name]
+    own = {"controller": "first_order_smflc", **preset.controller}
+    return [
+        *(("estimator", key, value) for key, value in preset.estimator.items()),
+        *(("controller", key, value) for key, value in own.items()),
     ]
 
 

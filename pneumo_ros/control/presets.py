@@ -38,8 +38,8 @@ PRESETS: dict[str, Preset] = {
         _SURFACE,
         {
             "controller": "two_valve",
-            "area_rate_share": 0.6,
-            "pole": 14.0,
+            "area_rate_share": 0.7,
+            "pole": 12.0,
             "sliding_heave_in_s3": 1000.0,
             "follow_axles": True,
         },

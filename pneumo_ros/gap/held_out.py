@@ -55,16 +55,16 @@ def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active],
 
 
 def channel_gaps(record: Any, predicted: Array) -> Array:
-    """(C,) rms of log - prediction over the std of the log's channel; 1e3 where it diverged."""
+    """(C,) rms of log - prediction over the std of the log's channel; 1e3 where it diverged, NaN without a sample."""
     there = record.weight > 0.0
     error = np.where(there, record.measured - predicted, 0.0)
     rms = np.sqrt(np.sum(error**2, axis=0) / np.maximum(there.sum(axis=0), 1))
-    return np.where(np.isfinite(rms), rms / scale_of(record), 1e3)
+    return np.where(there.any(axis=0), np.where(np.isfinite(rms), rms / scale_of(record), 1e3), np.nan)
 
 
 def total_gap(per_channel: Array) -> float:
-    """Contract section 3: root mean square over the channels."""
-    return float(np.sqrt(np.mean(np.square(per_channel))))
+    """Contract section 3: root mean square over the channels that were measured."""
+    return float(np.sqrt(np.nanmean(np.square(per_channel))))
 
 
 def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, seed: int = 1) -> tuple[float, float]:
@@ -88,5 +88,5 @@ def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, s
 
 
 def noise_floor(record: Any) -> Array:
-    """(C,) gap that the sensors' white noise alone leaves."""
-    return np.asarray(record.noise / scale_of(record))
+    """(C,) gap that the sensors' white noise alone leaves; NaN for a channel without a sample."""
+    return np.where((record.weight > 0.0).any(axis=0), record.noise / scale_of(record), np.nan)

@@ -30,6 +30,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
+from pneumo_ros.session.stages import continues
 from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import LoopTiming
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
@@ -55,7 +56,6 @@ COMMON: tuple[Parameter, ...] = (
 ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
-GAP_PERIODS = 10  # control periods without a sample after which estimator and controller begin afresh
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
@@ -98,8 +98,8 @@ class RigNode(Node):
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
-        if "daq" in str(self.values["session_nodes"]).split(","):
-            prefer_this_process()  # hardware does not wait for other programs
+        if "daq" in str(self.values["session_nodes"]).split(",") and name != "session_recorder":
+            prefer_this_process()  # hardware does not wait for other programs; the recorder may
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
@@ -200,7 +200,7 @@ class RigNode(Node):
 
     def continues(self, stamp_ns: int, last_ns: int) -> bool:
         """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
-        return 0 <= stamp_ns - last_ns <= GAP_PERIODS * self.period_ns
+        return continues(stamp_ns, last_ns, self.period_ns)
 
     # -- health ----------------------------------------------------------------------------------------------------
 

@@ -89,7 +89,7 @@ class ControllerNode(RigNode):
     def _watch(self) -> None:
         """Safe command for as long as no fresh estimate comes; monotonic time."""
         age = time.monotonic_ns() - self._last_ns
-        if not self._last_ns or age <= self._timeout_ns:
+        if not self._last_ns or age <= self._timeout_ns or self.stop.set:
             return
         if not self._stale:
             self._stale = True

@@ -23,6 +23,7 @@ from pneumo_ros.session.supervisor import END_REASON
 from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, STRING, TOPICS, Topic
 from pneumo_ros.session.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 
+DRAIN_LIMIT = 5.0  # s
 QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
 PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "every parameter change", "")
 PARAMETERS: tuple[Parameter, ...] = (
@@ -95,9 +96,10 @@ class SessionRecorderNode(RigNode):
         return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else "stopped by SIGTERM"
 
     def drain(self, executor: Executor) -> None:
-        """Spin until nothing has come for :data:`QUIET_PERIOD`."""
+        """Spin until nothing has come for :data:`QUIET_PERIOD`; for nodes that never fall silent there is a limit."""
         before, quiet_since = -1, time.monotonic()
-        while time.monotonic() - quiet_since < QUIET_PERIOD:
+        end = quiet_since + DRAIN_LIMIT
+        while time.monotonic() - quiet_since < QUIET_PERIOD and time.monotonic() < end:
             executor.spin_once(timeout_sec=0.02)
             if self.writer.received != before:
                 before, quiet_since = self.writer.received, time.monotonic()

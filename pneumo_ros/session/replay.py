@@ -25,7 +25,7 @@ from pneumo_ros.session.cdr import JointEncoder
 from pneumo_ros.session.inspection import Setup, read_setups
 from pneumo_ros.session.reading import Log, TopicInfo
 from pneumo_ros.session.records import Records
-from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage
+from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage, continues
 from pneumo_ros.session.topics import Topic
 from pneumo_ros.session.writing import interface
 
@@ -132,12 +132,15 @@ def replay(log: Log, overrides: Overrides | None = None) -> Replayed:
     recorded = {t.name: track(log, t) for t in (topics.ESTIMATE, topics.COMMAND, topics.SLIDING) if has(log, t)}
     taken = _only(measured, recorded.get(topics.ESTIMATE.name))
     # With other parameters the recorded outputs cannot show when a change took effect.
+    period_ns = round(period * 1e9)
     estimates = None if given.get("estimator") else _payloads(log, topics.ESTIMATE)
-    estimate, _ = _run(_build(EstimatorStage, rig, period), plans["estimator"], taken, estimates, topics.ESTIMATE)
+    estimate, _ = _run(
+        _build(EstimatorStage, rig, period), plans["estimator"], taken, estimates, topics.ESTIMATE, period_ns
+    )
     heard = _only(estimate, recorded.get(topics.COMMAND.name))
     commands = None if given else _payloads(log, topics.COMMAND)
     build = _build(ControllerStage, rig, period)
-    command, telemetry = _run(build, plans["controller"], heard, commands, topics.COMMAND)
+    command, telemetry = _run(build, plans["controller"], heard, commands, topics.COMMAND, period_ns)
     sliding = _only(telemetry, recorded.get(topics.SLIDING.name))
     replayed = {topics.ESTIMATE: estimate, topics.COMMAND: command, topics.SLIDING: sliding}
     agreements = tuple(_agreement(log, topic, found) for topic, found in replayed.items() if topic.name in recorded)
@@ -257,7 +260,7 @@ def _payloads(log: Log, topic: Topic) -> dict[int, bytes] | None:
 
 
 def _run(
-    build: Build, wanted: Plan, given: Track, recorded: Mapping[int, bytes] | None, topic: Topic
+    build: Build, wanted: Plan, given: Track, recorded: Mapping[int, bytes] | None, topic: Topic, period_ns: int
 ) -> tuple[Track, Track]:
     """Step every sample; (values, telemetry)."""
     encode = JointEncoder(topic.frame_id, topic.names).encode
@@ -267,7 +270,7 @@ def _run(
     last = -1
     for i, stamp in enumerate(given.stamp_ns.tolist()):
         sample = given.values[i]
-        if state is None or stamp < last:  # a jump back in time resets the nodes
+        if state is None or not continues(stamp, last, period_ns):
             state = stage.first(sample)
         after, output = stage.step(state, sample)
         if waiting and stamp >= waiting[0][0] - CHANGE_WINDOW_NS:

@@ -40,7 +40,13 @@ class Stage(Protocol):
         """New state and output."""
 
 
+GAP_PERIODS = 10  # control periods without a sample after which estimator and controller begin afresh
 _NOTHING = np.empty(0)
+
+
+def continues(stamp_ns: int, last_ns: int, period_ns: int) -> bool:
+    """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
+    return 0 <= stamp_ns - last_ns <= GAP_PERIODS * period_ns
 
 
 class EstimatorStage:

@@ -17,7 +17,7 @@ from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.parameters import Value
 from pneumo_ros.plant.air_spring import effective_area
 from pneumo_ros.plant.conventional import Conventional, conventional_rates, simulate_conventional
-from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.half_car import HalfCar, half_car
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.road import LENGTH_SCALE, make_road
@@ -40,6 +40,7 @@ class HalfExperiment:
     exact : true rates and accelerations, no noise: the thesis's simulation; False is the rig's sensors
     height_error_in : what both height sensors read too much, in (Section 6.7.5: 0.2)
     delay : periods between sample and valve
+    off : rig values that the plant has and the controller does not know of
     """
 
     preset: str
@@ -48,6 +49,7 @@ class HalfExperiment:
     exact: bool = False
     height_error_in: float = 0.0
     delay: int = 0
+    off: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ def road_of(settings: ThesisSettings, seed: int) -> NDArray[np.float64]:
 def run(settings: ThesisSettings, experiment: HalfExperiment, seed: int) -> Run:
     """A pneumatic experiment over one road."""
     rig, car = nominal()
+    if experiment.off:
+        car = half_car(rig.with_values(**experiment.off), (car.front.reference_pressure, car.rear.reference_pressure))
     preset = PRESETS[experiment.preset]
     estimator = build_estimator(rig, settings.period, {**preset.estimator, **experiment.estimator})
     controller = build_controller(rig, settings.period, {**preset.controller, **experiment.controller})

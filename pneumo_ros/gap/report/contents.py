@@ -40,6 +40,7 @@ class Findings:
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
     laws : what is missing at the places, as curves
+    mended : held-out gap with flexible corrections at the places found, no law named; None to leave it out
     """
 
     summary: Mapping[str, Any]
@@ -50,6 +51,7 @@ class Findings:
     regimes: Sequence[str] = ()
     conditional: Mapping[str, float] = field(default_factory=dict)
     laws: Sequence[Law] = ()
+    mended: float | None = None
 
 
 def contents(found: Findings) -> dict[str, Any]:
@@ -71,7 +73,7 @@ def contents(found: Findings) -> dict[str, Any]:
             if share >= 0.01
         ],
         "laws": [_law(law) for law in found.laws],
-        "ladder": ladder(_rungs(summary["gap"])),
+        "ladder": ladder(_rungs(summary["gap"], found.mended)),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
         "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10]],
@@ -169,7 +171,7 @@ def _sentence(text: str) -> str:
 def _percent(share: float) -> str:
     """Whole per cent, with a digit more where 99.6 would read as 100."""
     value = 100.0 * share
-    return f"{value:.1f} %" if 99.0 < value < 100.0 else f"{value:.0f} %"
+    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{value:.0f} %"
 
 
 def _tone(summary: Mapping[str, Any]) -> str:
@@ -178,13 +180,16 @@ def _tone(summary: Mapping[str, Any]) -> str:
     return "fine" if summary["verdict"] == "none" else "found"
 
 
-def _rungs(gap: Mapping[str, Any]) -> list[tuple[str, float, str]]:
-    return [
+def _rungs(gap: Mapping[str, Any], mended: float | None) -> list[tuple[str, float, str]]:
+    rungs = [
         ("nominal model", float(gap["nominal"]), "nominal"),
         ("parameters re-estimated", float(gap["refit"]), "refit"),
         ("with the best explanation", float(gap["best"]), "best"),
         ("sensor noise alone", float(gap["noise_floor"]), "floor"),
     ]
+    if mended is not None:
+        rungs.insert(3, ("that place mended freely", mended, "mended"))
+    return rungs
 
 
 def _charts(found: Findings) -> list[dict[str, str]]:

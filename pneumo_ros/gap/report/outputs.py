@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import Diagnosis, write_json
+from pneumo_ros.gap.held_out import channel_gaps, total_gap
 from pneumo_ros.gap.report.contents import Findings
 from pneumo_ros.gap.report.page import write_report
 from pneumo_ros.gap.report.residual_log import write_residual_log
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
-from pneumo_ros.gap.where import Location, conditional_gaps, habitat, locate, missing_law
+from pneumo_ros.gap.where import Location, conditional_gaps, habitat, locate, missing_law, predict_located
 from pneumo_ros.gap.where.design import car_of
 from pneumo_ros.gap.where.regimes import harmonics
 
@@ -73,6 +74,7 @@ def _findings(
         phrases={name: effect.summary for name, effect in model.library.items()},
         regimes=_sentences(where, holdout, error) if telling else [],
         conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),
+        mended=_mended(model, where) if telling and diagnosis.verdict == "unknown" else None,
         laws=[missing_law(where, place) for place in _one_of_a_kind(where)] if telling else [],
     )
 
@@ -96,3 +98,8 @@ def _sentences(where: Location, holdout: Signals, error: Array) -> list[str]:
             f"(odd {found.odd:.2f}, even {found.even:.2f} of the first)"
         )
     return out
+
+
+def _mended(model: RigModel, where: Location) -> float:
+    """Held-out gap of the free run with the chosen places mended by their flexible corrections."""
+    return total_gap(channel_gaps(where.judge.signals, predict_located(model, where, where.judge)))
