@@ -93,22 +93,38 @@ class SerialRig:
         )  # fmt: skip
 
     def __enter__(self) -> SerialRig:
-        self._emulator = subprocess.Popen(self._command)
-        end = time.monotonic() + 60.0
-        while not self.link.is_symlink():
-            assert self._emulator.poll() is None and time.monotonic() < end, "the emulator did not start"
-            time.sleep(0.02)
-        self.driver.open()
+        self.start_emulator()
+        try:
+            self.driver.open()
+        except BaseException:
+            self.stop_emulator()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.driver.close()
-        self._emulator.terminate()
-        self._emulator.wait(30)
+        self.stop_emulator()
         if kind is None:
             self.truth = Truth(self.record_path)
+
+    def start_emulator(self) -> None:
+        self._emulator = subprocess.Popen(self._command)
+        end = time.monotonic() + 60.0
+        while not self.link.is_symlink():
+            if self._emulator.poll() is not None or time.monotonic() > end:
+                self.stop_emulator()
+                raise AssertionError("the emulator did not start")
+            time.sleep(0.02)
+
+    def stop_emulator(self) -> None:
+        self._emulator.terminate()
+        try:
+            self._emulator.wait(30)
+        except subprocess.TimeoutExpired:
+            self._emulator.kill()
+            self._emulator.wait()
 
     def arm(self, timeout: float = 15.0) -> None:
         """Arm as soon as nothing speaks against it."""
