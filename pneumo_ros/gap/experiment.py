@@ -137,7 +137,7 @@ def design_experiment(problem: Problem, best: Fit, rival: Fit) -> Experiment | N
 
 def _record(model: RigModel, profile: Profile, at_rest: Trim, like: Any) -> Any:
     """A log-shaped record of the profile from rest."""
-    t: Array = np.asarray(np.arange(round(DURATION / PERIOD)) * PERIOD, dtype=np.float64)
+    t = np.arange(round(DURATION / PERIOD), dtype=np.float64) * PERIOD
     commands = np.tile(at_rest.command, (len(t), 1))
     commands[:, :2] = np.clip(commands[:, :2] * profile.valves(t), 0.0, model.rig.inlet_area_max.value)
     road = profile.road(t) * np.minimum(1.0, t / 0.2)[:, None]
