@@ -7,7 +7,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from pneumo_ros.session.topics import BY_NAME, Flow
 
-RECORDER_DEPTH = 500  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
+RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
 
 _DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10}
 
