@@ -84,6 +84,17 @@ def test_scores_by_hand() -> None:
     assert m.shrink(cases)[0] == pytest.approx(0.9)
 
 
+def test_a_lag_is_compared_as_the_whole_of_it() -> None:
+    item = label("a", "single", ("valve_lag", "front"))
+    item["truth"][0]["parameters"] = {"lag": {"value": 0.0064, "unit": "s"}}
+    said = found("valve_lag")
+    said.ranking[0]["parameters"] = {
+        "valve_lag": {"value": 0.004, "std": 1e-4, "unit": "s"},
+        "valve_damping_ratio": {"value": 0.8, "std": 0.0, "unit": "1"},
+    }
+    assert m.parameters(m.cases_of({"a": item}, {"a": said})) == (pytest.approx(0.0), Share(1.0, 1), 1)
+
+
 def test_calibration_by_hand() -> None:
     cases = m.cases_of({k: LABELS[k] for k in "de"}, {"d": found("none", 0.8), "e": found("leak", 0.6)})
     assert expected_error(cases) == pytest.approx(0.5 * 0.2 + 0.5 * 0.6)

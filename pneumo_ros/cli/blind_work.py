@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import time
 from pathlib import Path
 
+from pneumo_ros import __version__
 from pneumo_ros.twin.case import made
 from pneumo_ros.twin.plan import Planned
 
@@ -26,8 +28,19 @@ def diagnose_case(item: tuple[str, tuple[str, ...], str, str]) -> None:
     began = time.perf_counter()
     diagnosis = _diagnosis(Path(folder) / "cases" / name, withhold)
     part = target.with_suffix(".part")
-    part.write_text(json.dumps({"diagnosis": diagnosis, "seconds": time.perf_counter() - began}, indent=1), "utf-8")
+    content = {"diagnosis": diagnosis, "seconds": time.perf_counter() - began, "commit": _commit()}
+    part.write_text(json.dumps(content, indent=1), "utf-8")
     part.rename(target)
+
+
+def _commit() -> str:
+    """Commit of the package's checkout; its version where there is none."""
+    try:
+        done = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=True,
+                              cwd=Path(__file__).parent)  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return __version__
+    return done.stdout.strip()
 
 
 def _diagnosis(case: Path, withhold: tuple[str, ...]) -> dict[str, object]:

@@ -193,19 +193,31 @@ def parameters(cases: Sequence[Case]) -> tuple[float, Share, int]:
 
 
 def _comparable(case: Case) -> tuple[float, float, float, float] | None:
-    """Value, std, truth and the neutral value (1 for factors) of the first parameter with the truth's unit."""
+    """Value, std, truth and the neutral value (1 for factors) of the parameter with the truth's unit."""
     item = case.label["truth"][0]
     if not item["comparable"]:
         return None
     name, first = next(iter(item["parameters"].items()))
     neutral = 1.0 if name == "scale" else 0.0
-    for entry in (case.found.best.get("parameters") or {}).values():
+    stated = case.found.best.get("parameters") or {}
+    for entry in stated.values():
         if entry["unit"] == first["unit"]:
-            value = float(entry["value"])
+            value, std = float(entry["value"]), float(entry["std"])
             if neutral and abs(value) < 0.5:  # stated as an error of the scale rather than as the scale
                 value += 1.0
-            return value, float(entry["std"]), float(first["value"]), neutral
+            if name == "lag":
+                value, std = _total_lag(value, std, stated)
+            return value, std, float(first["value"]), neutral
     return None
+
+
+def _total_lag(time: float, std: float, stated: Mapping[str, Any]) -> tuple[float, float]:
+    """A second order lag stated as time constant 1/w and damping ratio is 2 ratio / w late: what the label says."""
+    for name, entry in stated.items():
+        if "damping_ratio" in name:
+            ratio = float(entry["value"])
+            return 2.0 * ratio * time, 2.0 * math.hypot(ratio * std, time * float(entry["std"]))
+    return time, std
 
 
 def seconds(cases: Sequence[Case]) -> tuple[float, float]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pneumo_ros.errors import InputError
+from pneumo_ros.twin.plan import plan
 from pneumo_ros.twin.scoring import metrics as m
 from pneumo_ros.twin.scoring.baselines import applied
 from pneumo_ros.twin.scoring.calibration import expected_error, reliability, risk_coverage
@@ -88,12 +89,12 @@ def write_report(
     """Put a section on ``page`` (Markdown) above earlier ones, and its plot beside it; returns the table of scores."""
     cases = cases_of(labels, found)
     rivals = {name: cases_of(labels, verdicts) for name, verdicts in applied(found).items()}
-    table, commit = _table(cases, rivals), _commit()
+    table, commit = _table(cases, rivals), "+".join(sorted({c.found.commit for c in cases}))
     plot = page.with_name(f"{page.stem}-{manifest['set']}-{commit}.png")
     parts = [
-        f"## Set `{manifest['set']}` at {commit}",
-        f"Seed {manifest['seed']}; {len(cases)} of {len(labels)} cases diagnosed; {manifest['software']}; all "
-        f"{len(labels)} seals verified.",
+        f"## Set `{manifest['set']}`, diagnosed by commit {commit}",
+        f"Seed {manifest['seed']}; the first {len(labels)} cases of {_size_of(manifest)}; {len(cases)} diagnosed; "
+        f"{manifest['software']}; all {len(labels)} seals verified.",
         table,
         _detection(cases, rivals),
         f"![reliability and risk]({plot.name})",
@@ -108,6 +109,14 @@ def write_report(
     _plot(plot, cases)
     part.rename(page)
     return table
+
+
+def _size_of(manifest: Mapping[str, Any]) -> int:
+    """How many cases the whole set has."""
+    try:
+        return len(plan(str(manifest["set"])))
+    except InputError:  # a set of somebody's own
+        return len(manifest.get("cases", []))
 
 
 def _table(cases: Sequence[Case], rivals: Mapping[str, Sequence[Case]]) -> str:
@@ -181,15 +190,6 @@ def _short(value: Share | float) -> str:
 def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
-
-
-def _commit() -> str:
-    try:
-        done = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=True,
-                              cwd=Path(__file__).parent)  # fmt: skip
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-    return done.stdout.strip()
 
 
 def _plot(path: Path, cases: Sequence[Case]) -> None:

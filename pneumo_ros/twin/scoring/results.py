@@ -28,6 +28,7 @@ class Found:
     gap : held-out gaps: nominal, refit, best, noise_floor
     edit : gaps on the edit log: nominal, refit, best; empty when it was not predicted
     seconds : wall clock of the diagnosis
+    commit : of the software that made it
     """
 
     verdict: str
@@ -38,6 +39,7 @@ class Found:
     gap: Mapping[str, Any] = field(default_factory=dict)
     edit: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = math.nan
+    commit: str = "unknown"
 
     @property
     def named(self) -> frozenset[str]:
@@ -63,7 +65,7 @@ class Found:
         return self.verdict not in ("none", "not_testable")
 
 
-def parse(diagnosis: Mapping[str, Any], seconds: float = math.nan) -> Found:
+def parse(diagnosis: Mapping[str, Any], seconds: float = math.nan, commit: str = "unknown") -> Found:
     """A diagnosis from the content of diagnosis.json."""
     places = sorted(diagnosis.get("location", []), key=lambda item: -float(item["share"]))
     return Found(
@@ -75,6 +77,7 @@ def parse(diagnosis: Mapping[str, Any], seconds: float = math.nan) -> Found:
         gap=diagnosis.get("gap", {}),
         edit={key.removeprefix("gap_"): value for key, value in (diagnosis.get("edit_test") or {}).items()},
         seconds=seconds,
+        commit=commit,
     )
 
 
@@ -93,7 +96,7 @@ def load_results(folder: Path, cases: Mapping[str, object]) -> dict[str, Found]:
             continue
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
-            out[name] = parse(content["diagnosis"], float(content["seconds"]))
+            out[name] = parse(content["diagnosis"], float(content["seconds"]), str(content.get("commit", "unknown")))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(f"cannot read this diagnosis ({error})", where=path,
                              remedy="delete it and run `pneumo blind diagnose` again") from error  # fmt: skip
