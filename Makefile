@@ -33,21 +33,10 @@ types: $(READY)
 unit: $(READY)
 	$(BIN)/python -m pytest
 
-bench: $(READY)  ## Every benchmark, side by side with its limit
-	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+SPEED := kernel composed control_step reading replay lockstep
 
-WORKERS ?= 2
-BLIND ?= build/blind
-
-blind: $(READY)  ## The full blind check, 240 sealed cases (hours); goes on where it was interrupted
-	$(BIN)/pneumo blind make $(BLIND) --set full --workers $(WORKERS)
-	$(BIN)/pneumo blind diagnose $(BLIND) --workers $(WORKERS)
-	$(BIN)/pneumo blind score $(BLIND) --output docs/blind-results.md
-
-blind-ci: $(READY)  ## Six blind cases that must keep their verdicts
-	$(BIN)/pneumo blind make $(BLIND)-ci --set ci --workers $(WORKERS)
-	$(BIN)/pneumo blind diagnose $(BLIND)-ci --workers $(WORKERS)
-	$(BIN)/pneumo blind score $(BLIND)-ci --expect test/data/blind-ci.json
+bench: $(READY)  ## Every speed, side by side with its limit
+	for name in $(SPEED); do echo "== $$name"; $(BIN)/python bench/$$name.py || exit 1; done
 
 docs: $(READY)  ## Write the generated tables of docs/ anew
 	$(BIN)/python -m pneumo_ros.cli.reference
