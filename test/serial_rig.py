@@ -18,6 +18,7 @@ from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import DriverCore
 from pneumo_ros.daq.driver import SerialDriver
 from pneumo_ros.daq.intake import Measurement
+from pneumo_ros.daq.priority import freeze_startup_objects
 from pneumo_ros.daq.reasons import Event, Reason
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.estimation import half_car as estimation
@@ -94,6 +95,7 @@ class SerialRig:
 
     def __enter__(self) -> SerialRig:
         self.start_emulator()
+        freeze_startup_objects()
         try:
             self.driver.open()
         except BaseException:

@@ -6,6 +6,7 @@ what board, line and driver were demonstrably late at that moment is measured an
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import time
@@ -37,6 +38,7 @@ def preferred() -> Iterator[None]:
     before = os.getpriority(os.PRIO_PROCESS, 0)
     prefer_this_process()
     yield
+    gc.unfreeze()
     os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
@@ -49,15 +51,15 @@ class StalledError(Exception):
     """A timeout tripped before the scenario began."""
 
 
-def attempt(folder: Path, scenario: Callable[[Path], None]) -> None:
-    for number in range(ATTEMPTS):
+def attempt(folder: Path, scenario: Callable[[Path], None], times: int = ATTEMPTS) -> None:
+    for number in range(times):
         own = folder / str(number)
         own.mkdir()
         try:
             return scenario(own)
         except StalledError as stalled:
             print(f"attempt {number}: {stalled}")
-    pytest.skip(f"this computer stalled too long for a 1 kHz link, {ATTEMPTS} times in a row: nothing was measured")
+    pytest.skip(f"this computer stalled too long for a 1 kHz link, {times} times in a row: nothing was measured")
 
 
 def armed_until(rig: SerialRig, seconds: float) -> None:
@@ -298,11 +300,11 @@ def test_zero_and_span_at_run_time(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_ride_and_stamps_over_the_line(tmp_path: Path, loop: Loop) -> None:
-    """A clock 100 ppm fast that wraps on the way: no frame lost, stamps within 1 ms, the plant's ride within 5 %."""
+    """A minute, a clock 100 ppm fast that wraps on the way: no frame lost, stamps within 1 ms, the plant's ride."""
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "bench"))
     from serial_loop import JUDGED, START_UP, reference, ride
 
-    duration = 8.0
+    duration = 60.0
     wanted = reference(duration, 1, loop)
 
     def scenario(folder: Path) -> None:
@@ -323,8 +325,7 @@ def test_ride_and_stamps_over_the_line(tmp_path: Path, loop: Loop) -> None:
         if (lateness > 15_000_000).any() or np.mean(lateness > 2_000_000) > 0.01:
             raise StalledError("the board was late too often or too long: the loop ran with another delay")
         found = ride(truth.states[inside], 1e-3)
-        for name in JUDGED:  # in so short a run the noise alone moves pitch by some percent
-            mean, spread = wanted[name]
-            assert found[name] == pytest.approx(mean, rel=0.05 + spread), name
+        for name in JUDGED:
+            assert found[name] == pytest.approx(wanted[name][0], rel=0.05), name
 
-    attempt(tmp_path, scenario)
+    attempt(tmp_path, scenario, times=2)  # a minute each

@@ -46,7 +46,7 @@ def emulate(
     from pneumo_ros.daq.calibration_file import load_calibration
     from pneumo_ros.daq.emulator import Emulator
     from pneumo_ros.daq.faults import parse_fault
-    from pneumo_ros.daq.priority import prefer_this_process
+    from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
     from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
     from pneumo_ros.rig import load_rig
 
@@ -67,6 +67,7 @@ def emulate(
         signal.signal(number, lambda *_: emulator.stop())
     simulation.warm_up()
     prefer_this_process()
+    freeze_startup_objects()
     console.print(f"emulating the rig on {link}; Ctrl-C ends it; try", soft_wrap=True)
     console.print(f"  pneumo run --source serial --port {link} --calibration {calibration}", soft_wrap=True)
     done = emulator.run(duration)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import signal
 import sys
 import time
@@ -16,6 +15,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from pneumo_ros.daq.priority import freeze_startup_objects
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.nodes.base import RigNode, StopRequest
 
@@ -75,9 +75,7 @@ def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = 
     executor = working_executor(nodes, context)
     for node in nodes:
         node.stop = stop
-    # What start-up made lives as long as the process: without this, a full collection stops the loop for 70 ms.
-    gc.collect()
-    gc.freeze()
+    freeze_startup_objects()
     spin_once = executor.spin_once
     while not stop.set:
         spin_once(SPIN_TIMEOUT)
