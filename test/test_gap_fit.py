@@ -108,7 +108,7 @@ def test_jumps_between_samples_are_timed(model: RigModel) -> None:
     clean = model.simulate(truth, initial=trim(model.rig).state)
     problem = Problem(model, (signals_of(clean, road, commands, 1),))
     best = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
-    moved = timed(problem, best)
+    moved = timed(problem, problem, best)
     assert moved is not problem
     again = fit(moved, Candidate(), best.x, best.jacobian)
     assert np.mean(again.residual**2) < 0.5 * np.mean(best.residual**2)

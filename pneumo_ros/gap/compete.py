@@ -51,7 +51,8 @@ class Contest:
 
     Attributes
     ----------
-    problem : the problem as last timed
+    logged : the problem with the command's jumps where the logs have them
+    problem : the same as last timed
     refit : the nominal structure re-estimated
     singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
     promised : screening of the singles at the refit, for the report
@@ -59,6 +60,7 @@ class Contest:
     visible : effect id -> rms in sigmas that its typical size would move the outputs by
     """
 
+    logged: Problem
     problem: Problem
     refit: Fit
     effort: Effort
@@ -84,7 +86,8 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     """Run the competition; ``progress`` is called with the share done."""
     progress(0.0, "re-estimating the nominal model")
     nominal = Candidate()
-    contest = Contest(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), effort, progress)
+    refit = fit(problem, nominal, problem.start(nominal, None, ()), iterations=15)
+    contest = Contest(problem, problem, refit, effort, progress)
     _time_jumps(contest)
     _run_singles(contest)
     _time_jumps(contest)
@@ -105,7 +108,7 @@ def _room_for_more(contest: Contest) -> bool:
 
 def _time_jumps(contest: Contest) -> None:
     """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
-    moved = timed(contest.problem, contest.best)
+    moved = timed(contest.logged, contest.problem, contest.best)
     if moved is contest.problem:
         return
     contest.problem = moved

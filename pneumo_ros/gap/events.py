@@ -9,6 +9,7 @@ hold.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -34,24 +35,33 @@ class HasEvents(Protocol):
         """The record with each jump ``lead`` (samples, 0..1) earlier, as the mean over the row before it."""
 
 
-def timed(problem: Problem, best: Fit) -> Problem:
-    """The problem with its commands' jumps put where the best candidate wants them, or itself if that gains nothing."""
-    model = problem.model
+def timed(logged: Problem, current: Problem, best: Fit) -> Problem:
+    """The problem with its commands' jumps put where the best candidate wants them, or the current one if that gains
+    nothing.
+
+    Parameters
+    ----------
+    logged : the problem with the jumps where the logs have them: every timing starts from it, so that what an earlier,
+        wrong structure made of the jumps is undone
+    current : the problem as last timed
+    best : the best fit of the current problem
+    """
+    model = logged.model
     if not isinstance(model, HasEvents) or best.diverged or best.jacobian is None:
-        return problem
-    rows = problem.fitted
+        return current
+    rows = current.fitted
     if float(np.mean(best.residual[rows] ** 2)) > TOO_COARSE:
-        return problem
-    listed = [model.events(record) for record in problem.records]
+        return current
+    listed = [model.events(record) for record in logged.records]
     count = sum(len(events) for events in listed)
     if not 0 < count <= MOST_EVENTS:
-        return problem
-    lead, x = _leads(problem, best, listed)
+        return current
+    lead, x = _leads(logged, replace(best, residual=logged.residual(best.candidate, best.x)), listed)
     split = np.split(lead, np.cumsum([len(events) for events in listed])[:-1])
-    records = tuple(model.led(r, e, x) for r, e, x in zip(problem.records, listed, split, strict=True))
-    moved = Problem(model, records, problem.averaged)
+    records = tuple(model.led(r, e, x) for r, e, x in zip(logged.records, listed, split, strict=True))
+    moved = Problem(model, records, logged.averaged)
     after = fit(moved, best.candidate, x, best.jacobian, iterations=3)
-    return moved if np.mean(after.residual[rows] ** 2) < WORTH * np.mean(best.residual[rows] ** 2) else problem
+    return moved if np.mean(after.residual[rows] ** 2) < WORTH * np.mean(best.residual[rows] ** 2) else current
 
 
 def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> tuple[Array, Array]:

@@ -33,8 +33,8 @@ class Strut(NamedTuple):
 
 class Air(NamedTuple):
     """The gas of one spring: pressure Pa absolute, height m, height rate m/s, volume m3, temperature K (Eq. 4.17),
-    inflow and outflow kg/s, exponent n, supply (stagnation) temperature K, and the flow that an ideal opening to the
-    atmosphere would let out, kg/s per m2."""
+    inflow and outflow kg/s, exponent n, supply (stagnation) temperature K, the flow that an ideal opening to the
+    atmosphere would let out, kg/s per m2, and the supply's pressure Pa absolute."""
 
     pressure: float
     height: float
@@ -46,6 +46,7 @@ class Air(NamedTuple):
     exponent: float
     supply_temperature: float
     escape: float
+    supply: float
 
 
 class Tyre(NamedTuple):
@@ -93,6 +94,7 @@ def air_of(
         gas.exponent,
         gas.supply_temperature,
         escape,
+        supply,
     )
 
 
