@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
+from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
 from pneumo_ros.gap.selection import Thresholds, noise_level, score
+from pneumo_ros.gap.shooting import astray, fit_from_windows
 
 NOT_EVIDENT = 0.8  # of the least fall of mean square that counts as evidence
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
@@ -86,7 +88,11 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     """Run the competition; ``progress`` is called with the share done."""
     progress(0.0, "re-estimating the nominal model")
     nominal = Candidate()
-    refit = fit(problem, nominal, problem.start(nominal, None, ()), iterations=15)
+    refit = _rescued(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), 15)
+    if refit.diverged:
+        raise InputError("the nominal model runs away on these logs, whatever its tolerances",
+                         where=", ".join(r.name for r in problem.records),
+                         remedy="check rig values, units and signs of command and road")  # fmt: skip
     contest = Contest(problem, problem, refit, effort, progress)
     _time_jumps(contest)
     _run_singles(contest)
@@ -95,6 +101,14 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
         _run_pairs(contest)
         _time_jumps(contest)
     return contest
+
+
+def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
+    """The fit, or, where its free run went astray, the better one that starts from short windows."""
+    if not astray(problem, state):
+        return state
+    other = fit_from_windows(problem, state.candidate, state.x, iterations)
+    return state if other is None or not other.cost < state.cost else other
 
 
 def _room_for_more(contest: Contest) -> bool:
@@ -178,6 +192,7 @@ def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tu
         values = [*problem.values(base.candidate, base.x), *promise.values]
         start = problem.start(candidate, base.x[: problem.fixed], values)
         one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        one = _rescued(problem, one, contest.effort.short)
         if one.diverged:
             contest.lost.append(candidate.label)
         else:
