@@ -9,7 +9,9 @@ command's jumps by (:mod:`pneumo_ros.gap.events`), they are timed and the finali
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
@@ -19,6 +21,7 @@ from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, star
 from pneumo_ros.gap.selection import Thresholds, noise_level, score
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 
+PROBE = 3  # steps of a probe
 NOT_EVIDENT = 0.8  # of the least fall of mean square that counts as evidence
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
@@ -35,14 +38,16 @@ class Effort:
     seconds : second effects tried on the first, second, ... leader
     blind_pairs : pairs taken from the screening at the refit
     pair_finalists : pairs fitted to convergence
+    probes : second effects probed on each leader
     short, long : iterations of a short and of a full fit
     """
 
-    singles: int = 12
+    singles: int = 10
     finalists: int = 5
     seconds: tuple[int, ...] = (6, 4, 2)
     blind_pairs: int = 3
     pair_finalists: int = 3
+    probes: int = 24
     short: int = 3
     long: int = 8
 
@@ -140,7 +145,8 @@ def _run_singles(contest: Contest) -> None:
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
     contest.visible = visibility(problem, contest.refit, found)
-    short = _short_fits(contest, contest.refit, _varied(contest.promised, effort.singles, 3), (0.1, 0.4))
+    chosen = _varied(_probed(problem, contest.refit, contest.promised), effort.singles, 3)
+    short = _short_fits(contest, contest.refit, chosen, (0.1, 0.4))
     ended = [_finish(problem, one, effort, k < STARTED_TWICE) for k, one in enumerate(short[: effort.finalists])]
     contest.singles = _by_cost(ended) + short[effort.finalists :]
 
@@ -161,6 +167,7 @@ def _run_pairs(contest: Contest) -> None:
         part = leader.candidate.parts[0]
         others = [p for p in all_parts(problem) if compatible((part, p))]
         promised = promises(problem, leader, trials(problem, leader, others))
+        promised = _probed(problem, leader, _varied(promised, effort.probes, 3))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
         short += _short_fits(contest, leader, unseen(promised, (part,), count), span)
     found = trials(problem, contest.refit, all_parts(problem))
@@ -168,6 +175,26 @@ def _run_pairs(contest: Contest) -> None:
     short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
     ended = [_finish(problem, one, effort, False) for one in short[: effort.pair_finalists]]
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+    _try_without_each(contest)
+
+
+def _try_without_each(contest: Contest) -> None:
+    """Each effect of the best pair alone, from the pair's values: a start that no screening of singles has seen."""
+    problem, pair = contest.problem, contest.pairs[0] if contest.pairs else None
+    if pair is None:
+        return
+    found, first = contest.finalists, 0
+    for part in pair.candidate.parts:
+        candidate = Candidate((part,))
+        count = len(problem.effect_parameters(candidate))
+        values = problem.values(pair.candidate, pair.x)[first : first + count].tolist()
+        first += count
+        start = problem.start(candidate, contest.refit.x[: problem.fixed], values)
+        alone = fit(problem, candidate, start, contest.refit.jacobian, iterations=contest.effort.long)
+        before = min((f.cost for f in found if f.candidate == candidate), default=np.inf)
+        if alone.cost < before - 1.0:
+            rest = [f for f in contest.singles if f.candidate != candidate]
+            contest.singles = _by_cost([alone, *rest[: contest.effort.finalists]]) + rest[contest.effort.finalists :]
 
 
 def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
@@ -182,6 +209,21 @@ def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise
         if len(taken) == count:
             break
     return taken
+
+
+def _probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Promise]:
+    """The promises in the order of what a few cheap steps make of them, with the values those end at: the screening is
+    linear, and a typical size may be far from the true one.
+    """
+    own = problem.values(base.candidate, base.x)
+    ranked = []
+    for promise in promised:
+        candidate = Candidate((*base.candidate.parts, *promise.parts))
+        start = problem.start(candidate, base.x[: problem.fixed], [*own, *promise.values])
+        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True)
+        values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
+        ranked.append((one.cost, promise if one.diverged else replace(promise, values=values)))
+    return [promise for _, promise in sorted(ranked, key=lambda item: item[0])]
 
 
 def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:

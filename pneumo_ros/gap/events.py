@@ -19,7 +19,9 @@ from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 
 PRIOR_STD = 0.5  # samples: a lead costs something, so that jumps nothing depends on stay where the log has them
-WORTH = 0.9  # the mean square must fall below this share, or the log's own times stand
+# The mean square must fall below this share, or the log's own times stand: jumps that really led take most of what a
+# right structure leaves, while a wrong one can always hide some of its error behind them.
+WORTH = 0.6
 TOO_COARSE = 400.0  # mean square in sigmas above which the structure is too wrong to time anything by it
 MOST_EVENTS = 600
 

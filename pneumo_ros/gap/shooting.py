@@ -30,7 +30,7 @@ class Sliceable(Record, Protocol):
 
 def astray(problem: Problem, state: Fit) -> bool:
     """Whether a fit's free run is no use."""
-    return state.diverged or problem.gap(state.residual[problem.fitted].clip(-1e6, 1e6)) > ASTRAY
+    return state.diverged or problem.gap(state.residual.clip(-1e6, 1e6)) > ASTRAY
 
 
 def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, iterations: int) -> Fit | None:
