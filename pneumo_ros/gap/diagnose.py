@@ -18,7 +18,7 @@ from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.selection import Scored, Thresholds, null_thresholds, score, select
 from pneumo_ros.gap.uncertainty import covariance, effect_estimates, nuisance_estimates
-from pneumo_ros.gap.verdict import Calibration, Opinion, judge, name_of
+from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Whereabouts:
     flat: bool
 
 
-Locate = Callable[[Any, Sequence[Any], Any, Array, Sequence[Active]], Whereabouts]
+Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
@@ -55,7 +55,8 @@ class Options:
     effort : how many candidates are fitted
     limits : what counts as evidence
     calibration : constants of the probabilities
-    locate : (model, fit logs, held-out log, nuisance, active) -> :class:`Whereabouts` of what that structure leaves
+    locate : (model, fit logs, held-out log, nuisance or None for nominal, active) -> :class:`Whereabouts` of what that
+        structure leaves
     experiment : design the experiment that splits an ambiguity group
     """
 
@@ -103,8 +104,12 @@ def diagnose(
     refit = score(problem, contest.refit)
     finalists = [score(problem, f) for f in contest.finalists]
     chosen = select(refit, finalists, options.limits)
-    opinion = judge(refit, finalists, chosen, options.limits, options.calibration)
-    found = _report(problem, contest, opinion, refit, finalists, holdout, options, tell, notes, edit)
+    everything = np.ones(len(problem.measured), dtype=bool)
+    base = _final(problem, contest.refit, everything)
+    best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
+    runs = _runs(problem, base, best, holdout)
+    opinion = judge(refit, finalists, chosen, options.limits, options.calibration, _on_held_out(runs, holdout))
+    found = _report(problem, contest, opinion, refit, finalists, base, best, runs, holdout, options, tell, notes, edit)
     return _within_limits(found, [*fit_logs, holdout])
 
 
@@ -117,7 +122,9 @@ def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
     cap = min(one.cap for _, one in limitations)
     blocked = any(getattr(r, "blocked", False) for r in records)
     verdict = "not_testable" if blocked else found.verdict
-    return replace(found, verdict=verdict, probability=min(found.probability, cap), notes=notes)
+    cap = 0.0 if blocked else cap
+    ranking = tuple(replace(one, probability=min(one.probability, cap)) for one in found.ranking)
+    return replace(found, verdict=verdict, probability=min(found.probability, cap), ranking=ranking, notes=notes)
 
 
 def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
@@ -140,6 +147,9 @@ def _report(
     opinion: Opinion,
     refit: Scored,
     finalists: Sequence[Scored],
+    base: Fit,
+    best: Fit,
+    runs: Mapping[str, HeldOut],
     holdout: Any,
     options: Options,
     tell: Progress,
@@ -147,19 +157,13 @@ def _report(
     edit: Any | None,
 ) -> Diagnosis:
     model = problem.model
-    everything = np.ones(len(problem.measured), dtype=bool)
-    base = _final(problem, contest.refit, everything)
-    best = base if opinion.chosen.size == 0 else _final(problem, opinion.chosen.fit, everything)
-    nominal_values = np.array([p.nominal for p in model.parameters])
-    runs = {"nominal": held_out(model, holdout, nominal_values, ()), "refit": _held(problem, base, holdout)}
-    runs["best"] = runs["refit"] if best is base else _held(problem, best, holdout)
     tell(0.93, "ranking")
     ranking = _ranking(problem, opinion, finalists, base, best, runs, holdout)
     group = ambiguity_group(problem, opinion, finalists, options.limits)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
     tell(0.95, "locating")
     before, after = _whereabouts(problem, base, best, holdout, options)
-    location = _location(problem, opinion, holdout, nuisance, active, runs, before if best is base else after)
+    location = _location(problem, opinion, holdout, nuisance, active, runs, before)
     experiment = None
     if options.experiment is not None and len(group) > 1:
         tell(0.97, "designing the next experiment")
@@ -198,6 +202,18 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
 def _held(problem: Problem, one: Fit, holdout: Any) -> HeldOut:
     active = problem.active(one.candidate, problem.values(one.candidate, one.x))
     return held_out(problem.model, holdout, problem.nuisance(one.x), active)
+
+
+def _runs(problem: Problem, base: Fit, best: Fit, holdout: Any) -> dict[str, HeldOut]:
+    """Nominal, re-estimated and best structure on the held-out log."""
+    nominal_values = np.array([p.nominal for p in problem.model.parameters])
+    runs = {"nominal": held_out(problem.model, holdout, nominal_values, ()), "refit": _held(problem, base, holdout)}
+    return runs | {"best": runs["refit"] if best is base else _held(problem, best, holdout)}
+
+
+def _on_held_out(runs: Mapping[str, HeldOut], holdout: Any) -> HeldOutGaps:
+    floor = total_gap(noise_floor(holdout))
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor)
 
 
 def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
@@ -266,14 +282,18 @@ def side_of(model: Model, candidate: Candidate) -> str | None:
 def _whereabouts(
     problem: Problem, base: Fit, best: Fit, holdout: Any, options: Options
 ) -> tuple[Whereabouts | None, Whereabouts | None]:
-    """Of what the refit leaves, and of what the best named structure leaves."""
+    """Of what the nominal structure leaves, and of what the best named one leaves.
+
+    The first starts at the nominal values: the search answers the tolerances itself, while those of the free-run refit
+    have bent to the gap already.
+    """
     if options.locate is None:
         return None, None
-    found = []
-    for one in (base, best) if best is not base else (base,):
-        active = problem.active(one.candidate, problem.values(one.candidate, one.x))
-        found.append(options.locate(problem.model, problem.records, holdout, problem.nuisance(one.x), active))
-    return found[0], found[-1]
+    before = options.locate(problem.model, problem.records, holdout, None, ())
+    if best is base:
+        return before, before
+    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
+    return before, options.locate(problem.model, problem.records, holdout, problem.nuisance(best.x), active)
 
 
 def _location(
@@ -283,14 +303,17 @@ def _location(
     nuisance: Array,
     active: Sequence[Active],
     runs: Mapping[str, HeldOut],
-    left: Whereabouts | None,
+    before: Whereabouts | None,
 ) -> list[tuple[str, float]]:
-    """A named effect's own places; else the places where a flexible correction helps."""
+    """A named effect's own places; else the places where a flexible correction of the nominal model helps.
+
+    Not of the best named structure: a wrong name has bent the model where it acts.
+    """
     refit, best = runs["refit"].total, runs["best"].total
     if opinion.verdict != "unknown" and active:
         initial = settle(problem.model, holdout, nuisance, active)
         return effect_shares(problem.model, holdout, nuisance, initial, active, max(0.0, 1.0 - best / refit))
-    return [] if left is None else list(left.shares)
+    return [] if before is None else [(place, float(np.clip(share, 0.0, 1.0))) for place, share in before.shares]
 
 
 def _evidence(

@@ -6,7 +6,7 @@ air chamber) is diagnosed by the same code; :mod:`pneumo_ros.gap.rig_model` is t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -51,6 +51,18 @@ class EffectParameter:
     typical: float
     size: bool = False
     starts: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A number that an effect's parameters give together, for the report: often better known than any of them.
+
+    ``of`` maps the parameter values (SI, in order) to it.
+    """
+
+    name: str
+    unit: str
+    of: Callable[[tuple[float, ...]], float]
 
 
 class EffectLike(Protocol):

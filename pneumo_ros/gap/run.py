@@ -96,7 +96,7 @@ def diagnose_files(
 
 
 def whereabouts(
-    model: RigModel, fit: Sequence[Signals], holdout: Signals, nuisance: Array, active: Sequence[Active]
+    model: RigModel, fit: Sequence[Signals], holdout: Signals, nuisance: Array | None, active: Sequence[Active]
 ) -> Whereabouts:
     """Places of what a structure leaves, by flexible corrections of its equations in weak form."""
     found = locate(model, fit, holdout, Start(nuisance, tuple(active)))

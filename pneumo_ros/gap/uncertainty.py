@@ -70,6 +70,26 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
         out[name] = Estimate(
             value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
         )
+    return out | _derived(problem, fit, cov)
+
+
+def _derived(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """What an effect's parameters give together, its variance by linear propagation."""
+    out: dict[str, Estimate] = {}
+    first = problem.fixed
+    for effect, _ in fit.candidate.parts:
+        parameters = problem.model.effects[effect].parameters
+        scale = np.array([p.typical for p in parameters])
+        block = slice(first, first + len(parameters))
+        values, own = fit.x[block] * scale, cov[block, block] * np.outer(scale, scale)
+        first += len(parameters)
+        for one in getattr(problem.model.effects[effect], "derived", ()):
+            value = one.of(tuple(values))
+            steps = 1e-6 * np.maximum(np.abs(values), 1e-6 * scale)
+            slope = np.array([(one.of(tuple(values + s * e)) - value) / s for s, e in zip(steps, np.eye(len(steps)),
+                                                                                        strict=True)])  # fmt: skip
+            name = one.name if one.name not in out else f"{effect}.{one.name}_2"
+            out[name] = Estimate(value, float(np.hypot(np.sqrt(max(slope @ own @ slope, 0.0)), LAW * value)), one.unit)
     return out
 
 

@@ -1,8 +1,9 @@
 """From scores to a verdict with a probability.
 
-Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind? If not, the
-effect is not in the library ("unknown"). And among the named: how much better is one than the next on the blocks kept
-from the fit?
+Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind, on the blocks
+kept from the fit and on the held-out log alike? If not, the effect is not in the library ("unknown"): a wrong effect
+often mimics the fitted log and seldom another excitation. And among the named: how much better is one than the next on
+the blocks kept from the fit? The held-out log never chooses between names.
 The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
 """
 
@@ -28,6 +29,8 @@ class Calibration:
     steepness : exponent of that transition
     floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
+    held : held-out gap over the noise floor that a right structure may leave (jitter, lost samples, jumps between rows)
+    held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
     sharpness: float = 12.0
@@ -35,6 +38,16 @@ class Calibration:
     steepness: float = 4.0
     floor: float = 1.0
     real: float = 2.5
+    held: float = 1.5
+    held_real: float = 3.0
+
+
+@dataclass(frozen=True)
+class HeldOutGaps:
+    """Gaps on the held-out log in noise floors: of the refit, and of the chosen structure."""
+
+    refit: float
+    chosen: float
 
 
 @dataclass(frozen=True)
@@ -68,11 +81,16 @@ def name_of(candidate: Candidate) -> str:
 
 
 def judge(
-    refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
+    refit: Scored,
+    finalists: Sequence[Scored],
+    chosen: Scored,
+    limits: Thresholds,
+    calibration: Calibration,
+    held: HeldOutGaps,
 ) -> Opinion:
     """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection."""
     named = _named(refit, finalists, chosen, limits, calibration)
-    unknown = _unknown(refit, chosen, calibration)
+    unknown = _unknown(refit, chosen, calibration, held)
     scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
     verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
     return Opinion(chosen, verdict, scaled, unknown)
@@ -104,11 +122,18 @@ def _named(
     return {c: w / total for c, w in weights.items()}
 
 
-def _unknown(refit: Scored, chosen: Scored, calibration: Calibration) -> float:
+def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: HeldOutGaps) -> float:
     """Probability that what is left is the work of something without a name."""
-    left = max(0.0, chosen.level - calibration.floor)
     if chosen.size == 0:
         share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
+        share += (_beyond(held.refit, 1.0) / _beyond(calibration.held_real, 1.0)) ** calibration.steepness
     else:
-        share = (np.sqrt(left / max(refit.level, 1e-9)) / calibration.leftover) ** calibration.steepness
+        left = max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9)
+        left_held = _beyond(held.chosen, calibration.held) / max(_beyond(held.refit, 1.0), calibration.held)
+        share = (max(np.sqrt(left), left_held) / calibration.leftover) ** calibration.steepness
     return float(share / (1.0 + share))
+
+
+def _beyond(gap: float, floor: float) -> float:
+    """What a gap holds beside a floor, both in noise floors."""
+    return float(np.sqrt(max(0.0, gap**2 - floor**2)))

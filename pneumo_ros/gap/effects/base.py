@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.gap.compose import PlantTerm
-from pneumo_ros.gap.model import EffectParameter
+from pneumo_ros.gap.model import Derived, EffectParameter
 from pneumo_ros.plant.air_spring import Gas
 from pneumo_ros.plant.half_car import Body
 
@@ -79,6 +79,7 @@ class Effect:
     sites : where it may act ("front", "rear", "both"; "" for the rig; or channel names)
     places : place per end with ``{end}`` standing for front or rear, first the one it is blamed on; unused for sensors
     parameters : those with ``size=True`` are zero when there is no effect
+    derived : what they give together
     plant, inputs, outputs, term : hooks, see the module
     """
 
@@ -87,6 +88,7 @@ class Effect:
     sites: tuple[str, ...]
     places: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
+    derived: tuple[Derived, ...] = ()
     plant: Callable[[Plant, Ends, Values], Plant] | None = None
     inputs: Callable[[Inputs, float, Ends, Values], Inputs] | None = None
     outputs: Callable[[Array, float, tuple[int, ...], Values], Array] | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
 from pneumo_ros.gap.effects.filters import lagged_line
-from pneumo_ros.gap.model import EffectParameter
+from pneumo_ros.gap.model import Derived, EffectParameter
 
 
 def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
@@ -24,5 +24,6 @@ EFFECT = Effect(
         EffectParameter("exciter_lag", "s", 0.0, 0.1, 0.005, size=True, starts=(0.015,)),
         EffectParameter("exciter_damping_ratio", "1", 0.3, 2.0, 0.8),
     ),
+    derived=(Derived("exciter_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,
 )

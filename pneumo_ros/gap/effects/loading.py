@@ -8,7 +8,7 @@ import importlib.util
 import pkgutil
 import sys
 from collections.abc import Iterable, Sequence
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -38,7 +38,7 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     package = str(Path(__file__).parent)
     names = sorted(m.name for m in pkgutil.iter_modules([package]) if m.name not in NOT_EFFECTS)
     found = [importlib.import_module(f"pneumo_ros.gap.effects.{name}").EFFECT for name in names]
-    found += [point.load() for point in entry_points(group=ENTRY_POINT_GROUP)]
+    found += [_installed(point) for point in entry_points(group=ENTRY_POINT_GROUP)]
     found += [_effect_in(Path(path)) for path in paths]
     library = {effect.id: effect for effect in found}
     for name in without:
@@ -71,6 +71,21 @@ def module_at(module: str, file: str) -> ModuleType:
         del sys.modules[module]
         raise
     return loaded
+
+
+def _installed(point: EntryPoint) -> Effect:
+    from pneumo_ros.gap.effects.base import Effect
+
+    where, remedy = f"entry point group {ENTRY_POINT_GROUP}", "mend or uninstall the package that brings it"
+    try:
+        effect = point.load()
+    except Exception as error:
+        raise InputError(f"cannot load the installed effect ({type(error).__name__}: {error})", where=where,
+                         key=point.name, value=point.value, remedy=remedy) from error  # fmt: skip
+    if not isinstance(effect, Effect):
+        raise InputError("the installed effect is no Effect", where=where, key=point.name, value=point.value,
+                         remedy=remedy)  # fmt: skip
+    return effect
 
 
 def _effect_in(path: Path) -> Effect:

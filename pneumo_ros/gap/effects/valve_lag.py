@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
 from pneumo_ros.gap.effects.filters import lagged_hold
-from pneumo_ros.gap.model import EffectParameter
+from pneumo_ros.gap.model import Derived, EffectParameter
 
 
 def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
@@ -25,5 +25,6 @@ EFFECT = Effect(
         EffectParameter("valve_lag", "s", 0.0, 0.15, 0.012, size=True, starts=(0.04,)),
         EffectParameter("valve_damping_ratio", "1", 0.3, 2.0, 0.8),
     ),
+    derived=(Derived("valve_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,
 )

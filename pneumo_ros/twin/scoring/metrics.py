@@ -214,6 +214,9 @@ def _comparable(case: Case) -> tuple[float, float, float, float] | None:
 def _total_lag(time: float, std: float, stated: Mapping[str, Any]) -> tuple[float, float]:
     """A second order lag stated as time constant 1/w and damping ratio is 2 ratio / w late: what the label says."""
     for name, entry in stated.items():
+        if "total_lag" in name:  # stated as it is
+            return float(entry["value"]), float(entry["std"])
+    for name, entry in stated.items():
         if "damping_ratio" in name:
             ratio = float(entry["value"])
             return 2.0 * ratio * time, 2.0 * math.hypot(ratio * std, time * float(entry["std"]))
