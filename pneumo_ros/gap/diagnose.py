@@ -108,7 +108,7 @@ def diagnose(
     base = _final(problem, contest.refit, everything)
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = _runs(problem, base, best, holdout)
-    opinion = judge(refit, finalists, chosen, options.limits, options.calibration, _on_held_out(runs, holdout))
+    opinion = judge(refit, finalists, chosen, options.calibration, _on_held_out(runs, holdout))
     found = _report(problem, contest, opinion, refit, finalists, base, best, runs, holdout, options, tell, notes, edit)
     return _within_limits(found, [*fit_logs, holdout])
 
@@ -158,7 +158,7 @@ def _report(
 ) -> Diagnosis:
     model = problem.model
     tell(0.93, "ranking")
-    ranking = _ranking(problem, opinion, finalists, base, best, runs, holdout)
+    ranking = _ranking(problem, opinion, refit, finalists, base, best, runs, holdout)
     group = ambiguity_group(problem, opinion, finalists, options.limits)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
     tell(0.95, "locating")
@@ -227,6 +227,7 @@ def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
 def _ranking(
     problem: Problem,
     opinion: Opinion,
+    nominal: Scored,
     finalists: Sequence[Scored],
     base: Fit,
     best: Fit,
@@ -235,15 +236,20 @@ def _ranking(
 ) -> list[Ranked]:
     refit = runs["refit"]
     fitted = problem.gap(base.residual)
-    out = [_plain(("none",), opinion.named[Candidate()], refit.total, fitted)]
+    out = [replace(_plain(("none",), opinion.named[Candidate()], refit.total, fitted), evidence=_weighed(nominal))]
     if opinion.unknown > 1e-3:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
     for scored in finalists:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else with_jacobian(problem, scored.fit)
         run = runs["best"] if same else _held(problem, one, holdout)
-        out.append(_ranked(problem, one, opinion.named[one.candidate], run, refit, holdout))
+        ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
+        out.append(replace(ranked, evidence=_weighed(scored)))
     return sorted(out, key=lambda r: -r.probability)
+
+
+def _weighed(one: Scored) -> dict[str, float]:
+    return {"level": one.level, "cost": one.fit.cost, "stretch": one.stretch}
 
 
 def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: float) -> Ranked:

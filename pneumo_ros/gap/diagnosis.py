@@ -54,6 +54,8 @@ class Ranked:
     shrink : 1 - gap_after / gap of the refit
     shrink_ci90 : moving-block bootstrap
     gap_fit : gap on the fitted logs
+    evidence : what its probability rests on: mean square on the selection blocks, training cost, squared stretch of the
+        tolerances
     notes : what counts against it
     """
 
@@ -66,6 +68,7 @@ class Ranked:
     shrink: float
     shrink_ci90: tuple[float, float]
     gap_fit: float = math.nan
+    evidence: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -80,6 +83,7 @@ class Ranked:
             "shrink": self.shrink,
             "shrink_ci90": list(self.shrink_ci90),
             "gap_fit": self.gap_fit,
+            "evidence": dict(self.evidence),
             "notes": list(self.notes),
         }
 

@@ -37,11 +37,11 @@ class Thresholds:
         inferred from less
     """
 
-    first: float = 0.3
-    second: float = 0.5
-    first_cost: float = 15.0
-    second_cost: float = 20.0
-    least: float = 0.3
+    first: float = 0.12
+    second: float = 0.3
+    first_cost: float = 120.0
+    second_cost: float = 150.0
+    least: float = 0.08
     model_form: float = 0.05
 
 

@@ -2,8 +2,8 @@
 
 Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind, on the blocks
 kept from the fit and on the held-out log alike? If not, the effect is not in the library ("unknown"): a wrong effect
-often mimics the fitted log and seldom another excitation. And among the named: how much better is one than the next on
-the blocks kept from the fit? The held-out log never chooses between names.
+often mimics the fitted log and seldom another excitation. And among the named: how much better does one fit than the
+next? The held-out log never chooses between names.
 The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
 """
 
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneumo_ros.gap.problem import Candidate
-from pneumo_ros.gap.selection import FORM, Scored, Thresholds
+from pneumo_ros.gap.selection import TOLL, Scored
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,9 @@ class Calibration:
 
     Attributes
     ----------
-    sharpness : fall of log probability per unit of log mean square on the selection blocks
+    sharpness : fall of log probability per unit of training cost (which takes ten fit samples for one and is therefore
+        far too sure of itself where laws differ)
+    first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
     leftover : share of the refit's misfit (rms) left by the best named structure at which "unknown" is as likely as it
     steepness : exponent of that transition
     floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
@@ -33,7 +35,9 @@ class Calibration:
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
-    sharpness: float = 12.0
+    sharpness: float = 0.06
+    first_toll: float = 9.0
+    second_toll: float = 9.0
     leftover: float = 0.18
     steepness: float = 4.0
     floor: float = 1.0
@@ -84,12 +88,11 @@ def judge(
     refit: Scored,
     finalists: Sequence[Scored],
     chosen: Scored,
-    limits: Thresholds,
     calibration: Calibration,
     held: HeldOutGaps,
 ) -> Opinion:
     """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection."""
-    named = _named(refit, finalists, chosen, limits, calibration)
+    named = _named(refit, finalists, chosen, calibration)
     unknown = _unknown(refit, chosen, calibration, held)
     scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
     verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
@@ -97,25 +100,17 @@ def judge(
 
 
 def _named(
-    refit: Scored, finalists: Sequence[Scored], chosen: Scored, limits: Thresholds, calibration: Calibration
+    refit: Scored, finalists: Sequence[Scored], chosen: Scored, calibration: Calibration
 ) -> dict[Candidate, float]:
-    """Softmax of scores; each further effect pays what chance would give it, its many rivals share one chance, and
-    differences within what laws of the right kind leave count less."""
-    form = limits.model_form**2 * refit.level
-
-    # Stretched tolerances tell sides and rivals of one kind apart; whether there is an effect, the data must say.
-    least = {size: min((f.stretch for f in (refit, *finalists) if f.size == size), default=0.0) for size in (0, 1, 2)}
-    count = {size: sum(f.size == size for f in finalists) for size in (0, 1, 2)}
+    """Softmax of the training costs, parameters and effects paying their tolls; the selection has the last word."""
+    tolls = (0.0, calibration.first_toll, calibration.first_toll + calibration.second_toll)
 
     def height(s: Scored) -> float:
-        level = np.log(FORM + form + s.level)
-        toll = (0.0, limits.first, limits.first + limits.second)[min(s.size, 2)]
-        toll += np.log(max(1, count[s.size])) / calibration.sharpness
-        return float(-calibration.sharpness * (level + toll) - 0.5 * (s.stretch - least[s.size]))
+        return -calibration.sharpness * (s.fit.cost + TOLL * len(s.fit.x)) - tolls[min(s.size, 2)]
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())
-    # The selection decides; what it chose is at least as probable as any other.
+    # What the selection blocks chose is at least as probable as any other.
     heights[chosen.fit.candidate] = max(top, heights[chosen.fit.candidate])
     weights = {c: float(np.exp(h - top)) for c, h in heights.items()}
     total = sum(weights.values())
