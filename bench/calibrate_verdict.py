@@ -1,23 +1,26 @@
 """How the verdict's probabilities fare on cases with known answers, and the constants that would have fared best.
 
 Reads a folder of labels (<case>.json with "kind") and one of diagnoses (<case>.json, bare or under "diagnosis"), as
-the verbs `pneumo blind make` and `pneumo blind diagnose` write them. Prints a reliability table and, for the decision
-between a named effect and "unknown", the constants of gap/verdict.Calibration with the least log loss.
+the verbs `pneumo blind make` and `pneumo blind diagnose` write them. Prints a reliability table and the constants of
+gap/verdict.Calibration with the least log loss: for the decision between a named effect and "unknown", and for the
+choice among names.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pneumo_ros.gap.verdict import Calibration
+from pneumo_ros.gap.selection import TOLL
+from pneumo_ros.gap.verdict import Calibration, beyond
 
-KNOWN, FOREIGN = ("single", "pair"), ("unknown", "withheld")
+FOREIGN = ("unknown", "withheld")
 
 
 def read(labels: Path, diagnoses: Path) -> list[tuple[dict[str, Any], dict[str, Any]]]:
@@ -31,48 +34,75 @@ def read(labels: Path, diagnoses: Path) -> list[tuple[dict[str, Any], dict[str, 
     return pairs
 
 
-def right(label: dict[str, Any], found: dict[str, Any]) -> bool:
-    """Whether the verdict is the truth."""
+def truth(label: dict[str, Any]) -> str:
+    """The verdict that is right."""
     if label["kind"] in FOREIGN:
-        return bool(found["verdict"] == "unknown")
-    return bool(found["verdict"] == ("+".join(sorted({t["effect"] for t in label["truth"]})) or "none"))
+        return "unknown"
+    return "+".join(sorted({t["effect"] for t in label["truth"]})) or "none"
 
 
 def unknown_share(found: dict[str, Any], constants: Calibration) -> float:
     """Probability of "unknown" from the evidence, with other constants."""
-    e = found["evidence"]
+    e, gap = found["evidence"], found["gap"]
+    refit, best = (gap[name] / gap["noise_floor"] for name in ("refit", "best"))
     if e["effects"] == 0:
         ratio = (e["level_refit"] / constants.real) ** (0.5 * constants.steepness)
+        ratio += (beyond(refit, 1.0) / beyond(constants.held_real, 1.0)) ** constants.steepness
     else:
         left = np.sqrt(max(0.0, e["level_chosen"] - constants.floor) / max(e["level_refit"], 1e-9))
-        ratio = (left / constants.leftover) ** constants.steepness
+        left_held = beyond(best, constants.held) / max(beyond(refit, 1.0), constants.held)
+        ratio = (max(left, left_held) / constants.leftover) ** constants.steepness
     return float(np.clip(ratio / (1.0 + ratio), 1e-3, 1.0 - 1e-3))
 
 
-def main() -> None:
-    """Print both tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("labels", type=Path)
-    parser.add_argument("diagnoses", type=Path)
-    options = parser.parse_args()
-    cases = [(label, found) for label, found in read(options.labels, options.diagnoses) if "evidence" in found]
+def named_share(label: dict[str, Any], found: dict[str, Any], constants: Calibration) -> float:
+    """Probability that the ranking gives the true structure, were the effect surely in the library."""
+    tolls = (0.0, constants.first_toll, constants.first_toll + constants.second_toll)
+    entries = [entry for entry in found["ranking"] if entry.get("evidence")]
+    sizes = [0 if entry["effects"] == ["none"] else len(entry["effects"]) for entry in entries]
+    heights = np.array([-constants.sharpness * (entry["evidence"]["cost"] + TOLL * len(entry["parameters"])) - tolls[n]
+                        for entry, n in zip(entries, sizes, strict=True)])  # fmt: skip
+    weights = np.exp(heights - heights.max())
+    true = np.array(["+".join(sorted(set(entry["effects"]))) == truth(label) for entry in entries])
+    return float(np.clip(weights[true].sum() / weights.sum(), 1e-3, 1.0))
+
+
+def report(cases: list[tuple[dict[str, Any], dict[str, Any]]]) -> None:
+    """The reliability as it is."""
     p = np.array([found["probability"] for _, found in cases])
-    hit = np.array([right(label, found) for label, found in cases])
+    hit = np.array([found["verdict"] == truth(label) for label, found in cases])
     print(f"{len(cases)} cases, {hit.sum()} right; mean probability {p.mean():.2f}")
     for low in np.arange(0.0, 1.0, 0.2):
         inside = (p >= low) & (p < low + 0.2 + 1e-9 * (low > 0.7))
         if inside.any():
             print(f"  p {low:.1f} to {low + 0.2:.1f}: {inside.sum():3d} cases, right {hit[inside].mean():.2f}")
-    judged = [(label["kind"] in FOREIGN, found) for label, found in cases if label["kind"] in KNOWN + FOREIGN]
-    grid = product((0.08, 0.12, 0.18, 0.25, 0.35), (2.0, 3.0, 4.0, 6.0), (1.5, 2.5, 4.0))
-    scored = []
-    for leftover, steepness, real in grid:
-        constants = Calibration(leftover=leftover, steepness=steepness, real=real)
-        share = np.array([unknown_share(found, constants) for _, found in judged])
-        foreign = np.array([truth for truth, _ in judged])
-        scored.append((-float(np.mean(np.log(np.where(foreign, share, 1.0 - share)))), constants))
-    for loss, c in sorted(scored, key=lambda item: item[0])[:5]:
-        print(f"  log loss {loss:.3f}: leftover {c.leftover}, steepness {c.steepness}, real {c.real}")
+
+
+def main() -> None:
+    """Print the reliability and, for both questions, the constants that would have lost least."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("labels", type=Path)
+    parser.add_argument("diagnoses", type=Path)
+    options = parser.parse_args()
+    cases = [(label, found) for label, found in read(options.labels, options.diagnoses) if "evidence" in found]
+    report(cases)
+    foreign = [truth(label) == "unknown" for label, _ in cases]
+    loss = []
+    for leftover, steepness, real in product((0.1, 0.14, 0.18, 0.22, 0.3), (2.0, 3.0, 4.0, 6.0), (1.5, 2.5, 4.0)):
+        c = replace(Calibration(), leftover=leftover, steepness=steepness, real=real)
+        share = [unknown_share(found, c) if out else 1.0 - unknown_share(found, c)
+                 for out, (_, found) in zip(foreign, cases, strict=True)]  # fmt: skip
+        loss.append((-float(np.mean(np.log(share))), f"leftover {leftover}, steepness {steepness}, real {real}"))
+    print("known or unknown:", *(f"  log loss {value:.3f}: {what}" for value, what in sorted(loss)[:4]), sep="\n")
+    known = [case for case, out in zip(cases, foreign, strict=True) if not out]
+    loss = []
+    for sharpness, first, second in product(
+        (0.01, 0.02, 0.04, 0.06, 0.1, 0.2), (5.0, 7.0, 9.0, 12.0), (5.0, 9.0, 14.0)
+    ):
+        c = replace(Calibration(), sharpness=sharpness, first_toll=first, second_toll=second)
+        share = [named_share(*case, c) for case in known]
+        loss.append((-float(np.mean(np.log(share))), f"sharpness {sharpness}, first toll {first}, second {second}"))
+    print("which name:", *(f"  log loss {value:.3f}: {what}" for value, what in sorted(loss)[:4]), sep="\n")
 
 
 if __name__ == "__main__":

@@ -121,14 +121,14 @@ def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: Held
     """Probability that what is left is the work of something without a name."""
     if chosen.size == 0:
         share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
-        share += (_beyond(held.refit, 1.0) / _beyond(calibration.held_real, 1.0)) ** calibration.steepness
+        share += (beyond(held.refit, 1.0) / beyond(calibration.held_real, 1.0)) ** calibration.steepness
     else:
         left = max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9)
-        left_held = _beyond(held.chosen, calibration.held) / max(_beyond(held.refit, 1.0), calibration.held)
+        left_held = beyond(held.chosen, calibration.held) / max(beyond(held.refit, 1.0), calibration.held)
         share = (max(np.sqrt(left), left_held) / calibration.leftover) ** calibration.steepness
     return float(share / (1.0 + share))
 
 
-def _beyond(gap: float, floor: float) -> float:
+def beyond(gap: float, floor: float) -> float:
     """What a gap holds beside a floor, both in noise floors."""
     return float(np.sqrt(max(0.0, gap**2 - floor**2)))
