@@ -18,11 +18,11 @@ from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
-from pneumo_ros.gap.selection import Thresholds, noise_level, score
+from pneumo_ros.gap.selection import FORM, Thresholds, noise_level, score
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 
 PROBE = 3  # steps of a probe
-NOT_EVIDENT = 0.8  # of the least fall of mean square that counts as evidence
+NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
@@ -118,11 +118,11 @@ def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
 
 def _room_for_more(contest: Contest) -> bool:
     """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
-    blocks is the sensors' noise but for less than any threshold.
+    blocks is so near the sensors' noise that even all of the rest would not be enough.
     """
     problem = contest.problem
     least = min(score(problem, one).level for one in (contest.refit, *contest.finalists))
-    return least - noise_level(problem) > NOT_EVIDENT * Thresholds().least
+    return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
 
 
 def _time_jumps(contest: Contest) -> None:

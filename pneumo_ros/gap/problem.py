@@ -67,18 +67,49 @@ class Problem:
     @cached_property
     def measured(self) -> Array:
         """(n, C) averaged measurements of all logs, one after the other."""
-        return np.vstack([average(r.measured, self.averaged) for r in self.records])
+        return np.vstack([self._averaged(k, r.measured) for k, r in enumerate(self.records)])
 
     @cached_property
     def weight(self) -> Array:
-        """(n, C) 1/sigma, zero where a sample is missing: noise after averaging and the model-form floor together."""
-        rows = []
-        for r in self.records:
-            scale = scale_of(r)
-            sigma = np.sqrt(np.asarray(r.noise) ** 2 / self.averaged + (MODEL_FORM_FLOOR * scale) ** 2)
-            there = average(r.weight, self.averaged) >= 1.0 - 1e-9
-            rows.append(there / np.where(sigma > 0.0, sigma, np.inf))
-        return np.vstack(rows)
+        """(n, C) 1/sigma, zero where no sample is there: noise after averaging and the model-form floor together."""
+        form = np.vstack(
+            [
+                np.tile(MODEL_FORM_FLOOR * scale_of(r), (len(n), 1))
+                for r, n in zip(self.records, self._real, strict=True)
+            ]
+        )
+        sigma = np.hypot(self.noise, form)
+        there = np.vstack([real.any(axis=1) for real in self._real])
+        return np.asarray(there / np.where(sigma > 0.0, sigma, np.inf))
+
+    @cached_property
+    def noise(self) -> Array:
+        """(n, C) standard deviation of the sensor noise after averaging."""
+        pairs = zip(self.records, self._real, strict=True)
+        return np.vstack([np.asarray(r.noise) / np.sqrt(np.maximum(real.sum(axis=1), 1.0)) for r, real in pairs])
+
+    @cached_property
+    def _real(self) -> list[Array]:
+        """For each log (n, averaged, C): 1 where a real sample stands behind the row's value."""
+        return [grouped(np.asarray(r.weight), self.averaged) for r in self.records]
+
+    @cached_property
+    def _shares(self) -> list[Array | None]:
+        """For each log, what each row counts in its average: only real samples do, in log and prediction alike, so that
+        a channel at a slower rate is compared where it was sampled. None where every sample is there."""
+        out: list[Array | None] = []
+        for real in self._real:
+            total = real.sum(axis=1, keepdims=True)
+            whole = bool(np.all(real == 1.0))
+            out.append(None if whole else np.where(total > 0.0, real / np.maximum(total, 1.0), 1.0 / self.averaged))
+        return out
+
+    def _averaged(self, k: int, samples: Array) -> Array:
+        """Fit samples of rows of log ``k``."""
+        shares = self._shares[k]
+        if shares is None:
+            return average(samples, self.averaged)
+        return np.asarray(np.einsum("nac,nac->nc", grouped(samples, self.averaged), shares))
 
     @cached_property
     def block(self) -> NDArray[np.int64]:
@@ -142,7 +173,7 @@ class Problem:
             initial, std = self.model.initial(record, active)
             first = len(self.model.parameters) + k * self.states
             initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
-            out.append(average(self.model.predict(record, nuisance, initial, active), self.averaged))
+            out.append(self._averaged(k, self.model.predict(record, nuisance, initial, active)))
         return np.vstack(out)
 
     def gap(self, residual: Array) -> float:
@@ -171,7 +202,7 @@ class Problem:
             first = len(self.model.parameters) + k * self.states
             initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
             rows = self.model.predict(record, nuisance, initial, active)
-            out.append(average(_between(rows, len(whole.measured)), self.averaged))
+            out.append(self._averaged(k, _between(rows, len(whole.measured))))
         return np.vstack(out)
 
     def residual(self, candidate: Candidate, x: Array) -> Array:
@@ -188,10 +219,15 @@ def _between(rows: Array, count: int) -> Array:
     return out[:count]
 
 
+def grouped(samples: Array, count: int) -> Array:
+    """Rows in groups of ``count``, (n, count, C); a remainder is dropped."""
+    whole = len(samples) // count
+    return samples[: whole * count].reshape(whole, count, -1)
+
+
 def average(samples: Array, count: int) -> Array:
     """Means of ``count`` rows; a remainder is dropped."""
-    whole = len(samples) // count
-    return np.asarray(np.add.reduce(samples[: whole * count].reshape(whole, count, -1), axis=1) * (1.0 / count))
+    return np.asarray(np.add.reduce(grouped(samples, count), axis=1) * (1.0 / count))
 
 
 def scale_of(record: Any) -> Array:

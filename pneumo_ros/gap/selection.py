@@ -37,11 +37,11 @@ class Thresholds:
         inferred from less
     """
 
-    first: float = 0.12
+    first: float = 0.07
     second: float = 0.3
-    first_cost: float = 120.0
+    first_cost: float = 100.0
     second_cost: float = 150.0
-    least: float = 0.08
+    least: float = 0.05
     model_form: float = 0.05
 
 
@@ -106,9 +106,8 @@ def score(problem: Problem, fit: Fit) -> Scored:
 
 def noise_level(problem: Problem) -> float:
     """What white sensor noise alone leaves of the mean square: less than one, sigmas hold a floor for model form."""
-    noise = np.mean([np.asarray(r.noise) ** 2 for r in problem.records], axis=0) / problem.averaged
     there = problem.weight > 0.0
-    return float(np.sum(problem.weight**2 * noise) / max(1, there.sum()))
+    return float(np.sum((problem.weight * problem.noise) ** 2) / max(1, there.sum()))
 
 
 def advantage(poorer: Scored, richer: Scored) -> float:
