@@ -45,6 +45,12 @@ def replay(
     diagnosis: Annotated[
         Path | None, typer.Option(help="diagnosis.json: --closed-loop runs the rig as it was diagnosed.")
     ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML) in place of the log's: --closed-loop runs it with its effects, --stepped believes it."
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the log with the replayed topics in place (.mcap).")
     ] = None,
@@ -65,10 +71,13 @@ def replay(
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
     if closed_loop or diagnosis is not None:
-        _closed_loop(found, parse_overrides(set_), diagnosis, plot)
+        _closed_loop(found, parse_overrides(set_), diagnosis, rig, plot)
     elif stepped or set_:
-        _stepped(found, parse_overrides(set_), output, plot)
+        _stepped(_with_rig(found, rig), parse_overrides(set_), output, plot)
     else:
+        if rig is not None:
+            raise InputError("a live replay publishes what was recorded and simulates no rig", where="--rig",
+                             remedy="add --closed-loop, or leave it out")  # fmt: skip
         from pneumo_ros.cli.replay_live import play
 
         play(found, rate, start, paused, loop, everything, domain_id)
@@ -92,6 +101,18 @@ def parse_overrides(texts: list[str] | None) -> dict[str, dict[str, Any]]:
             raise InputError("not a node that replay runs", where="--set", key=node, allowed=", ".join(TABLES))
         out.setdefault(node, {})[name] = value
     return out
+
+
+def _with_rig(log: Log, path: Path | None) -> Log:
+    """The log as if it had been made with another rig; what its effects do not do is said."""
+    from pneumo_ros.rig import load_rig
+
+    rig = log.config if path is None else load_rig(path)
+    if rig is not None and rig.effects:
+        names = ", ".join(one.label for one in rig.effects)
+        console.print(f"[cyan]note[/] the measurements are the recorded ones, so the rig's effects do nothing here: {names}",
+                      highlight=False, soft_wrap=True)  # fmt: skip
+    return log if path is None else replace(log, config=rig)
 
 
 def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path | None, plot: Path | None) -> None:
@@ -176,18 +197,29 @@ def _draw(result: Replayed, path: Path, title: str) -> None:
 
 
 def _closed_loop(
-    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, plot: Path | None
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, rig: Path | None, plot: Path | None
 ) -> None:
     from pneumo_ros.session.rerun import draw_rerun
-    from pneumo_ros.session.rerun import rerun as run_again
 
-    result = run_again(log, overrides) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
+    if diagnosis is not None and rig is not None:
+        raise InputError("two rigs at once", where="--rig", remedy="give --diagnosis or --rig")
+    result = _again(log, overrides, rig) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
     for note in result.notes:
         console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
     console.print(rerun_table(result))
     if plot is not None:
         draw_rerun(result, plot, f"{log.path.name}: its road through the rig's model in closed loop")
         console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
+
+
+def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | None) -> Rerun:
+    """From rest, on the log's rig or the given one, with its effects if it has any."""
+    from pneumo_ros.gap.stepped import stepped_rig
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.session.rerun import rerun
+
+    rig = log.config if path is None else load_rig(path)
+    return rerun(log, overrides, rig, stepped_rig if rig is not None and rig.diagnosed else None)
 
 
 def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path) -> Rerun:

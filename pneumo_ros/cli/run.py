@@ -17,6 +17,7 @@ from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
+    from pneumo_ros.rig import Rig
     from pneumo_ros.session.plan import Tables, Values
 
 app = typer.Typer()
@@ -46,7 +47,12 @@ def run(
     ] = "appendix_c",
     realtime: Annotated[bool, typer.Option("--realtime", help="Absolute deadlines instead of lockstep.")] = False,
     single_process: Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")] = False,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML), with its effects if pneumo diagnose --save-rig wrote it; the nominal rig by default."
+        ),
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
     output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
@@ -75,8 +81,10 @@ def run(
     _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": source})
     if source == "serial":
         _check_hardware(values["daq"], single_process)
-    _check(values, target)
+    checked = _check(values, target)
     console = Console()
+    if checked.effects:
+        _tell_effects(console, checked, source)
     with beside(domain_id) if view else nullcontext() as dashboard:
         _run_session(console, values, target, single_process, domain_id)
         _report(console, target, values, picture, report)
@@ -158,20 +166,34 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
     values["session_recorder"]["session"] = json.dumps({**session, "parameters": json.dumps(values)})
 
 
-def _check(values: Values, target: Path) -> None:
-    """Find every mistake before a process starts: rig, trim, road and output file."""
+def _tell_effects(console: Console, rig: Rig, source: str) -> None:
+    """Who acts on the rig's effects: the simulated rig does, the hardware has its own."""
+    names = ", ".join(one.label for one in rig.effects)
+    if source == "serial":
+        console.print(f"not simulated, for the hardware has its own: {names}; the log's rig names them", soft_wrap=True)
+    else:
+        console.print(f"the simulated rig has these effects: {names}", soft_wrap=True)
+
+
+def _check(values: Values, target: Path) -> Rig:
+    """Find every mistake before a process starts: rig, trim, effects, road and output file."""
     from pneumo_ros.plant.trim import trim
     from pneumo_ros.rig import load_rig
     from pneumo_ros.road import PARAMETERS, build_road
 
     rig = load_rig(str(values["road_profile"].get("rig", "")) or None)
     trim(rig)
+    if rig.effects:
+        from pneumo_ros.gap.standing import library_of, standing_effects
+
+        standing_effects(rig, library_of(rig))
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, where="road")
     if target.suffix != ".mcap":
         raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
     if target.exists():
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
+    return rig
 
 
 def _check_hardware(own: dict[str, Value], single_process: bool) -> None:
@@ -244,11 +266,11 @@ def _save_what_is_left(target: Path) -> None:
 
 def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
-    from pneumo_ros.session.passive import passive_twin
+    from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
     session = load_session(target)
-    other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
+    other = passive_run(session)
     ours = summarise(session, loop_timing(target), wall_time(target))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))
