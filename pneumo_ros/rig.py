@@ -111,8 +111,8 @@ class NamedEffect:
 class Rig:
     """Every number of the scaled half car (Table 3.4, sections 5.6 and 6.3), SI, with tolerances.
 
-    ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a rig that
-    is simulated with them is the twin of the one that was diagnosed. Controllers and estimators believe the numbers.
+    ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a
+    simulation with them is the twin of the rig that was diagnosed. Controllers and estimators believe the numbers.
     """
 
     name: str
@@ -281,7 +281,7 @@ def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
     base = {} if set(known) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
-    return Rig(name=name, **quantities)
+    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
 
 
 def _nominal_entries() -> dict[str, Any]:

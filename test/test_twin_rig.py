@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from rig_logs import signals_of, simulated
 
-from pneumo_ros.errors import InputError, PneumoError
 from pneumo_ros.gap.effects.loading import load_library
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
-from pneumo_ros.gap.stepped import stepped_rig
 from pneumo_ros.gap.twin_rig import TwinRig
-from pneumo_ros.plant.stepping import PlainRig
 from pneumo_ros.plant.trim import trim
-from pneumo_ros.rig import NamedEffect, Rig, load_rig, parse_rig
+from pneumo_ros.rig import NamedEffect, load_rig
 
 LIBRARY = load_library()
 VARIANTS = [(effect.id, site) for effect in LIBRARY.values() for site in effect.sites]

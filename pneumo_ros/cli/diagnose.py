@@ -85,6 +85,9 @@ def diagnose(
     if save_rig is not None:
         files.append(save_corrected_rig(found, task.model, save_rig, effect or ()))
     _show(console, found)
+    if found.experiment is not None:
+        console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
+        console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
 
 

@@ -23,8 +23,8 @@ def emulate(
                                            "bump, flat, or a CSV file.")] = "D",
     speed: Annotated[float, typer.Option(help="Full-scale speed, km/h.")] = 80.0,
     seed: Annotated[int, typer.Option(help="Seed of road, sensor noise and line faults.")] = 1,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML), with its effects if pneumo diagnose --save-rig wrote "
-                                                  "it; the nominal rig by default.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML), with its effects if pneumo diagnose --save-rig "
+                                                  "wrote it; the nominal rig by default.")] = None,
     calibration: Annotated[str, typer.Option(help="What the sensors and valves are really like: name or file.")]
         = "appendix_c",
     adc_bits: Annotated[int, typer.Option(min=8, max=32, help="Width of the input converter, bit.")] = 16,

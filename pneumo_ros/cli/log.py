@@ -119,8 +119,8 @@ def report(
     ] = None,
 ) -> None:
     """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
-    from pneumo_ros.session.reading import read_log
     from pneumo_ros.cli.passive import passive_run
+    from pneumo_ros.session.reading import read_log
     from pneumo_ros.session.report import write_report
     from pneumo_ros.session.summary import load_session
 

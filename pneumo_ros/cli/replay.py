@@ -17,6 +17,7 @@ from rich.table import Table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
+    from pneumo_ros.rig import Rig
     from pneumo_ros.session.reading import Log
     from pneumo_ros.session.replay import Replayed
     from pneumo_ros.session.rerun import Rerun
@@ -73,7 +74,7 @@ def replay(
     if closed_loop or diagnosis is not None:
         _closed_loop(found, parse_overrides(set_), diagnosis, rig, plot)
     elif stepped or set_:
-        _stepped(_with_rig(found, rig), parse_overrides(set_), output, plot)
+        _stepped(found, parse_overrides(set_), _believed(found, rig), output, plot)
     else:
         if rig is not None:
             raise InputError("a live replay publishes what was recorded and simulates no rig", where="--rig",
@@ -103,19 +104,21 @@ def parse_overrides(texts: list[str] | None) -> dict[str, dict[str, Any]]:
     return out
 
 
-def _with_rig(log: Log, path: Path | None) -> Log:
-    """The log as if it had been made with another rig; what its effects do not do is said."""
+def _believed(log: Log, path: Path | None) -> Rig | None:
+    """The rig that estimator and controller believe; that its effects do nothing here is said."""
     from pneumo_ros.rig import load_rig
 
     rig = log.config if path is None else load_rig(path)
     if rig is not None and rig.effects:
         names = ", ".join(one.label for one in rig.effects)
-        console.print(f"[cyan]note[/] the measurements are the recorded ones, so the rig's effects do nothing here: {names}",
-                      highlight=False, soft_wrap=True)  # fmt: skip
-    return log if path is None else replace(log, config=rig)
+        text = f"the measurements are the recorded ones, so the rig's effects do nothing here: {names}"
+        console.print(f"[cyan]note[/] {text}", highlight=False, soft_wrap=True)
+    return rig
 
 
-def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path | None, plot: Path | None) -> None:
+def _stepped(
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], rig: Rig | None, output: Path | None, plot: Path | None
+) -> None:
     from pneumo_ros.session.replay import replay as step
     from pneumo_ros.session.replay import replayed_log, warm_up
     from pneumo_ros.session.rewriting import refuse_target, write_log
@@ -124,11 +127,11 @@ def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path 
         refuse_target(output, log.path)
     warm_up(log)
     begin = time.perf_counter()
-    result = step(log, overrides)
+    result = step(log, overrides, rig)
     took = time.perf_counter() - begin
     _show_run(result, took)
     if overrides:
-        _show_what_if(log, result, plot)
+        _show_what_if(log, result, rig, plot)
     else:
         console.print(agreement_table(result))
         if plot is not None:
@@ -167,7 +170,7 @@ def agreement_table(result: Replayed) -> Table:
     return table
 
 
-def _show_what_if(log: Log, result: Replayed, plot: Path | None) -> None:
+def _show_what_if(log: Log, result: Replayed, rig: Rig | None, plot: Path | None) -> None:
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.what_if import CAVEAT, what_if
 
@@ -175,7 +178,7 @@ def _show_what_if(log: Log, result: Replayed, plot: Path | None) -> None:
         f"{node}.{name} = {value}" for node, own in result.overridden.items() for name, value in own.items()
     )
     console.print(f"what if {changed}", highlight=False, soft_wrap=True)
-    console.print(what_if_table(what_if(result, log.config or load_rig())))
+    console.print(what_if_table(what_if(result, rig or load_rig())))
     console.print(CAVEAT, highlight=False, soft_wrap=True)
     _draw(result, plot or log.path.with_name(f"{log.path.stem}-what-if.png"), f"{log.path.name}: {changed}")
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 FAILED = 1
-ALIASES = {"smflc": "default"}
+CONTROLLER = "smflc"
+ALIASES = {CONTROLLER: "default"}
 ROAD_CLASSES = "ABCDEFGH"
 RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
@@ -37,7 +38,13 @@ def run(
         typer.Option(
             help="smflc, passive, thesis, two_valve, area_rate_feedforward, or another of docs/parameters.md."
         ),
-    ] = "smflc",
+    ] = CONTROLLER,
+    valves: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of valve openings over time, played in open loop instead of a controller; docs/control.md."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of road and sensor noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Control rate, Hz.")] = 500.0,
     source: Annotated[str, typer.Option(help="sim: the simulated rig; serial: the hardware.")] = "sim",
@@ -71,14 +78,19 @@ def run(
 
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
+    if valves is not None:
+        controller = _player(controller)
     options = _options(road, duration, speed, controller, seed, rate, realtime or view, source)
+    if valves is not None:
+        options.append(("controller", "valve_profile", str(valves.resolve())))
     if source == "serial":
         options += [("daq", "port", port), ("daq", "calibration", calibration)]
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
     values = {node: own for node, own in values.items() if node in session_nodes(source)}
     target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
-    _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": source})
+    session = {"seed": str(seed), "road": road, "controller": controller, "source": source}
+    _finish_plan(values, rig, target, session | ({} if valves is None else {"valves": str(valves)}))
     if source == "serial":
         _check_hardware(values["daq"], single_process)
     checked = _check(values, target)
@@ -91,6 +103,15 @@ def run(
         if dashboard is not None:
             console.print("the dashboard stays until Ctrl-C")
             dashboard.wait()
+
+
+def _player(controller: str) -> str:
+    from pneumo_ros.control.half_car import PROFILE
+
+    if controller not in (CONTROLLER, PROFILE):
+        raise InputError("either a controller or a valve profile", where="--valves", key="--controller",
+                         value=controller, remedy="leave one of them out")  # fmt: skip
+    return PROFILE
 
 
 def session_nodes(source: str) -> tuple[str, ...]:
@@ -187,6 +208,7 @@ def _check(values: Values, target: Path) -> Rig:
         from pneumo_ros.gap.standing import library_of, standing_effects
 
         standing_effects(rig, library_of(rig))
+    _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, where="road")
     if target.suffix != ".mcap":
@@ -194,6 +216,22 @@ def _check(values: Values, target: Path) -> Rig:
     if target.exists():
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
     return rig
+
+
+def _check_profile(values: Values, rig: Rig) -> None:
+    """The valve profile, if one is played, against the rig and, on hardware, against the driver's own limits."""
+    from pneumo_ros.control.half_car import PROFILE
+    from pneumo_ros.daq.safety_config import load_safety
+    from pneumo_ros.plant.trim import trim
+    from pneumo_ros.valve_profile import read_profile
+
+    if values["controller"].get("controller") != PROFILE:
+        return
+    largest = rig.inlet_area_max.value
+    if "daq" in values:
+        safety = load_safety(str(values["daq"].get("safety", "")) or None)
+        largest = min(largest, safety.limits["command_area"].trip_high)
+    read_profile(str(values["controller"].get("valve_profile", "")), trim(rig).command, largest)
 
 
 def _check_hardware(own: dict[str, Value], single_process: bool) -> None:

@@ -95,8 +95,8 @@ def compose(slots: Sequence[Slot]) -> Compiled:
 
     Signature: (x0 (10,), commands (N, 4), road (N + 1, 2), correction (0 or N, 9), period, steps, body, front, rear,
     surface, on (K, 2) bool, values (K, 2, M), inner (K, 2, S), resume) -> states (N + 1, 10); rows after a divergence
-    are NaN. ``inner`` is where the terms' own states end; with ``resume`` they begin there instead of at rest, so that one
-    period after the other gives what all of them in one call give.
+    are NaN. ``inner`` is where the terms' own states end; with ``resume`` they begin there instead of at rest, so that
+    one period after the other gives what all of them in one call give.
     """
     kernel: Compiled = _load(_source(slots), tuple(_files(slots))).simulate
     return kernel
@@ -144,8 +144,8 @@ def _files(slots: Sequence[Slot]) -> list[str]:
 
 
 def _source(slots: Sequence[Slot]) -> str:
-    return "\n".join([_imports(slots), _HEAD, *_unpack(slots), _FIRST, *_start(slots), *_resume(slots), _LOOP, *_advance(slots),
-                      *_supply(slots), _SAG.format(indent=" " * 12), _STAGES, *_hooks(slots), _TAIL,
+    return "\n".join([_imports(slots), _HEAD, *_unpack(slots), _FIRST, *_start(slots), *_resume(slots), _LOOP,
+                      *_advance(slots), *_supply(slots), _SAG.format(indent=" " * 12), _STAGES, *_hooks(slots), _TAIL,
                       *_store(slots), ""])  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
 kernel.
 
-Effects that the rig's own configuration names (:attr:`RigModel.standing`) are in every simulation, before those that are
-asked for.
+Effects that the rig's own configuration names (:attr:`RigModel.standing`) are in every simulation, before those that
+are asked for.
 """
 
 from __future__ import annotations

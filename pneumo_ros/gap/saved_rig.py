@@ -1,9 +1,9 @@
 """The rig after diagnosis, as a file that every verb takes.
 
-``rig:`` holds what controllers and estimators may believe: parameters at their estimates (the mean of front and rear where
-the rig has one number for both), and effects that are a number of the rig. ``ends:`` holds what each end has of its own,
-``effects:`` everything else. The commanded outlet areas stay as they are: what is estimated is the opening that this command
-really gives, and it is an end's own.
+``rig:`` holds what controllers and estimators may believe: parameters at their estimates (the mean of front and rear
+where the rig has one number for both), and effects that are a number of the rig. ``ends:`` holds what each end has of
+its own, ``effects:`` everything else. The commanded outlet areas stay as they are: what is estimated is the opening
+that this command really gives, and it is an end's own.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The rig as diagnosed, stepped period by period: the twin that sessions, the emulator and the closed loop run.
 
-A step is a block of one row through the same hooks and the same kernel that simulate whole logs, with everything that an
-effect remembers (lags, delays, bristles, air masses, a sagging supply) carried in the state. So stepping gives the numbers
-of :meth:`pneumo_ros.gap.rig_model.RigModel.simulate`.
+A step is a block of one row through the same hooks and the same kernel that simulate whole logs, with everything that
+an effect remembers (lags, delays, bristles, air masses, a sagging supply) carried in the state. So stepping gives the
+numbers of :meth:`pneumo_ros.gap.rig_model.RigModel.simulate`.
 """
 
 from __future__ import annotations

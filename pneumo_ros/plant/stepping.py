@@ -27,7 +27,7 @@ class SteppedRig(Protocol):
         """State before the first step: the trim that the rig's numbers give."""
 
     def step(self, state: Any, command: Array, road: Array) -> Any:
-        """State one period later: command (4,) m2, held; road (2, 2) m, front and rear at the period's start and end."""
+        """State one period later: command (4,) m2, held; road (2, 2) m, front and rear, at its start and end."""
 
     def read(self, state: Any) -> tuple[float, ...]:
         """What the sensors show without noise, (6,) of :data:`pneumo_ros.plant.sensors.CHANNELS`."""

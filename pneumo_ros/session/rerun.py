@@ -14,11 +14,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.control.half_car import build_controller
+from pneumo_ros.control.half_car import PROFILE, build_controller
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import build_estimator
-from pneumo_ros.plant.stepping import SteppedRig
+from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.session import topics
@@ -79,12 +79,14 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     start = int(measured.stamp_ns[0])
     road = _road(log, start, int(measured.stamp_ns[-1]), period)
     seed = int(seed_of(log).get("plant", 0))
+    if values["controller"]["controller"] == PROFILE:
+        build = build or plain_rig
     if build is not None:
         stages = EstimatorStage(rig, period, values["estimator"]), ControllerStage(rig, period, values["controller"])
         noise = np.random.default_rng(seed).standard_normal((len(road) - 1, len(CHANNELS)))
         noise *= [rig.displacement_noise.value] * 4 + [rig.pressure_noise.value] * 2
         channels, commands = close_stepped(build(rig, period), stages, road, noise)
-        notes.append("the rig as diagnosed: " + (", ".join(one.label for one in rig.effects) or "no effect"))
+        notes += [f"the rig as diagnosed: {', '.join(one.label for one in rig.effects) or 'no effect'}"] * rig.diagnosed
     else:
         estimator = build_estimator(rig, period, values["estimator"])
         controller = build_controller(rig, period, values["controller"])
@@ -95,7 +97,7 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
         "sensor noise steers the valves: with other noise than the session's, motions differ in detail, not size"
     )
     return Rerun(
-        np.arange(len(channels)) * period,
+        np.arange(len(channels), dtype=np.float64) * period,
         channels,
         commands,
         (measured.stamp_ns - start) * 1e-9,

@@ -8,8 +8,8 @@ the entry point group ``pneumo_ros.effects``. Four kinds of hook:
 - ``term``: adds force or flow inside the compiled kernel, with own states where needed,
 - ``outputs``: changes what a sensor reports.
 
-``inputs`` and ``outputs`` work on a block of rows and carry a memory from block to block (None before the first row), so
-that a whole log and a rig that is stepped row by row go through the same lines; :func:`by_column` does the carrying.
+``inputs`` and ``outputs`` work on a block of rows and carry a memory from block to block (None before the first row),
+so that a whole log and a rig that is stepped row by row go through the same lines; :func:`by_column` does the carrying.
 """
 
 from __future__ import annotations
