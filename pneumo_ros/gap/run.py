@@ -10,10 +10,10 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.gap.compete import Progress
 from pneumo_ros.gap.diagnose import Options, Whereabouts, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.effects.loading import load_library
 from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
+from pneumo_ros.gap.standing import library_of
 from pneumo_ros.gap.where import Start, locate
 from pneumo_ros.rig import Rig
 
@@ -64,7 +64,7 @@ def prepared(
     if not fit:
         raise InputError("no log to fit", remedy="give at least one log")
     first = read_signals(fit[0], rig)
-    library = load_library([*(one.file for one in first.rig.effects if one.file), *effects])
+    library = library_of(first.rig, effects)
     for name in without:
         if name not in library:
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))

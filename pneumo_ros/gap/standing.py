@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.effects.base import Effect, ends_of
@@ -25,15 +26,20 @@ def standing_effects(rig: Rig, library: Mapping[str, Effect]) -> tuple[Active, .
     return found
 
 
-def library_of(rig: Rig) -> dict[str, Effect]:
-    """The package's library with the files that the rig's own effects name."""
-    return load_library(list(dict.fromkeys(one.file for one in rig.effects if one.file)))
+def library_of(rig: Rig, files: Sequence[str | Path] = ()) -> dict[str, Effect]:
+    """The package's library, the files that the rig's own effects name, and further ones.
+
+    A file that is not on this computer is left out: a log travels, and its effect may be given with ``files``.
+    """
+    named = dict.fromkeys(one.file for one in rig.effects if one.file)
+    return load_library([*(file for file in named if Path(file).exists()), *files])
 
 
 def _active(one: NamedEffect, rig: Rig, library: Mapping[str, Effect]) -> Active:
     where, effect = f"effects of {rig.name}", library.get(one.effect)
     if effect is None:
-        remedy = "correct it, or give the Python file that defines it (pneumo diagnose: --effect; rig file: file:)"
+        missing = f"{one.file} is not here; " if one.file else ""
+        remedy = f"{missing}give the Python file that defines it (pneumo diagnose: --effect; in the rig file: file)"
         raise InputError("unknown effect", where=where, key=one.effect, allowed=", ".join(library), remedy=remedy)
     if one.site not in effect.sites:
         allowed = ", ".join(repr(site) for site in effect.sites)
