@@ -29,6 +29,7 @@ from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import NamedEffect, Rig, load_rig, parse_rig
 from pneumo_ros.road import build_road
 from pneumo_ros.session.reading import read_log
+from pneumo_ros.session.rerun import compare_channels, rerun
 
 LIBRARY = load_library()
 VARIANTS = [(effect.id, site) for effect in LIBRARY.values() for site in effect.sites]
@@ -260,6 +261,9 @@ def test_a_session_of_the_twin_is_diagnosed_as_what_it_is(tmp_path: Path) -> Non
         assert code == 0 and "the simulated rig has these effects: valve_lag (rear)" in said, said
     config = read_log(logs[0]).config
     assert config is not None and config.effects == (LAG,)
+    again = rerun(read_log(logs[0]), build=stepped_rig)
+    assert "valve_lag (rear)" in again.notes[0]
+    assert all(row[-1] < 0.01 for row in compare_channels(again))
     found = prepared(logs[:1], logs[1], NOMINAL).diagnose(Options(pairs=False))
     best = found.ranking[0]
     assert found.verdict == "valve_lag" and best.side == "rear" and best.shrink > 0.95
