@@ -29,7 +29,12 @@ def diagnose(
     holdout: Annotated[
         Path | None, typer.Option(help="Log that nothing is fitted to; default: the last third of the last fit log.")
     ] = None,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); default: the rig that the log carries.")] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML); effects it names are part of the model; default: the rig that the log carries."
+        ),
+    ] = None,
     edit: Annotated[
         Path | None,
         typer.Option(help="Log after a known change (payload, supply, speed), predicted without refitting."),
@@ -38,7 +43,12 @@ def diagnose(
         list[Path] | None, typer.Option(help="Python file with an effect of your own (EFFECT = ...), repeatable.")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="Effect id that must not compete, repeatable.")] = None,
-    save_rig: Annotated[Path | None, typer.Option(help="Write the corrected rig (YAML) here.")] = None,
+    save_rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the corrected rig with its effects (YAML) here, for --rig of run, emulate, replay and diagnose."
+        ),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
     tables: Annotated[
         bool, typer.Option("--tables", help="Instead of logs: what the Chapter 5 model misses in Tables 5.4 and 5.5.")
@@ -73,8 +83,11 @@ def diagnose(
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
-        files.append(save_corrected_rig(found, task.model, save_rig))
+        files.append(save_corrected_rig(found, task.model, save_rig, effect or ()))
     _show(console, found)
+    if found.experiment is not None:
+        console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
+        console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
 
 
