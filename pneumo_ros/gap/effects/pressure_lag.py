@@ -1,17 +1,20 @@
-"""A pressure sensor at the end of a tube, or slow in itself: first order lag."""
+"""A pressure sensor at the end of a tube, or slow in itself: second order lag, 1/((lag s)^2 + 2 damping lag s + 1).
+
+A short tube rings (damping below one), a long or throttled one creeps like a first order lag (damping well above it).
+"""
 
 from __future__ import annotations
 
 from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Memory, Values, by_column
-from pneumo_ros.gap.effects.filters import first_order_line
-from pneumo_ros.gap.model import EffectParameter
+from pneumo_ros.gap.effects.filters import lagged_line
+from pneumo_ros.gap.model import Derived, EffectParameter
 
 
 def outputs(
     outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
 ) -> tuple[Array, Memory]:
     """What the sensor reports."""
-    return by_column(lambda u, kept: first_order_line(u, period, values[0], kept), outputs, channels, memory)
+    return by_column(lambda u, kept: lagged_line(u, period, values[0], values[1], kept), outputs, channels, memory)
 
 
 EFFECT = Effect(
@@ -19,6 +22,10 @@ EFFECT = Effect(
     summary="a pressure sensor reports late",
     sites=PRESSURES_OR_BOTH,
     places=(),
-    parameters=(EffectParameter("sensor_lag", "s", 0.0, 0.2, 0.008, size=True, starts=(0.03,)),),
+    parameters=(
+        EffectParameter("sensor_lag", "s", 0.0, 0.2, 0.005, size=True, starts=(0.02,)),
+        EffectParameter("sensor_damping_ratio", "1", 0.3, 5.0, 0.8, starts=(2.0,)),
+    ),
+    derived=(Derived("sensor_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     outputs=outputs,
 )
