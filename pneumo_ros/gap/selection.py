@@ -37,11 +37,11 @@ class Thresholds:
         inferred from less
     """
 
-    first: float = 0.07
+    first: float = 0.1
     second: float = 0.3
-    first_cost: float = 100.0
+    first_cost: float = 130.0
     second_cost: float = 150.0
-    least: float = 0.05
+    least: float = 0.06
     model_form: float = 0.05
 
 
