@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.noise import quantum, white_noise
-from pneumo_ros.gap.signals.types import MEASURED, Limitation
+from pneumo_ros.gap.signals.types import MEASURED, NO_VERDICT, Limitation
 
 Array = NDArray[np.float64]
 
@@ -165,8 +165,8 @@ def all_limits(weight: Array, measured: Array, noise: Array) -> list[Limitation]
     found = []
     if np.count_nonzero(used) < 3:
         names = ", ".join(name for name, ok in zip(MEASURED, used, strict=True) if ok) or "none"
-        found.append(Limitation("too_few_channels", f"Only these channels are usable: {names}; no verdict.", (), 0.0))
+        found.append(Limitation("too_few_channels", f"Only these channels are usable: {names}{NO_VERDICT}", (), 0.0))
     moved = [np.std(measured[weight[:, i] > 0, i]) > 5.0 * noise[i] for i in range(len(MEASURED)) if used[i]]
     if moved and not any(moved):
-        found.append(Limitation("no_motion", "Nothing moved: every channel is within its noise; no verdict.", (), 0.0))
+        found.append(Limitation("no_motion", f"Nothing moved: every channel is within its noise{NO_VERDICT}", (), 0.0))
     return found
