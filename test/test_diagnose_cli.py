@@ -18,7 +18,7 @@ from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.run import prepared
 from pneumo_ros.gap.signals import read_signals
-from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.rig import load_rig
 
 PAGE = Path(__file__).parent.parent / "docs" / "diagnosis.md"
 SIZE = 900.0  # N s2/m2
@@ -35,13 +35,15 @@ def own_effect(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def damped_log(path: Path, seed: int, rig: Rig, own_effect: Path) -> Path:
-    """A log of a rig that has the example's effect at both ends."""
+def damped_log(path: Path, seed: int, own_effect: Path, payload: float = 0.0) -> Path:
+    """A log of the nominal rig that has the example's effect at both ends and, stated by its config, a payload, kg."""
     clean, road, commands = simulated(7.0, seed)
-    carrier = read_signals(write_log(path.with_suffix(".carrier.mcap"), clean, road, commands, [rig.to_yaml()]))
-    damped = RigModel(rig, load_library([own_effect]))
-    channels = damped.simulate(carrier, active=(Active("quadratic_damping", "both", (SIZE,)),))
-    return write_log(path, noisy(np.asarray(channels), seed), road, commands, [rig.to_yaml()])
+    carrier = read_signals(write_log(path.with_suffix(".carrier.mcap"), clean, road, commands, [load_rig().to_yaml()]))
+    model = RigModel(load_rig(), load_library([own_effect]))
+    values = [p.nominal + payload * (p.name == "sprung_mass") for p in model.parameters]
+    channels = model.simulate(carrier, np.array(values), active=(Active("quadratic_damping", "both", (SIZE,)),))
+    stated = load_rig().with_values(sprung_mass=load_rig().sprung_mass.value + payload)
+    return write_log(path, noisy(channels, seed), road, commands, [stated.to_yaml()])
 
 
 @pytest.mark.slow
@@ -49,10 +51,8 @@ def test_an_effect_of_ones_own_wins_and_predicts_a_known_change(
     tmp_path: Path, own_effect: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PNEUMO_KERNEL_CACHE", str(tmp_path / "kernels"))
-    rig = load_rig()
-    heavier = rig.with_values(sprung_mass=rig.sprung_mass.value + 4.0)
-    fit, held = (damped_log(tmp_path / f"{name}.mcap", k, rig, own_effect) for k, name in enumerate(("fit", "held")))
-    edit = damped_log(tmp_path / "heavier.mcap", 3, heavier, own_effect)
+    fit, held = (damped_log(tmp_path / f"{name}.mcap", k, own_effect) for k, name in enumerate(("fit", "held")))
+    edit = damped_log(tmp_path / "heavier.mcap", 3, own_effect, payload=4.0)
     library = load_library()
     without = [word for name in library if name not in KEPT for word in ("--without", name)]
     done = CliRunner().invoke(app, [
@@ -65,7 +65,7 @@ def test_an_effect_of_ones_own_wins_and_predicts_a_known_change(
     size = said["ranking"][0]["parameters"]["square_damping"]
     assert size["value"] == pytest.approx(SIZE, rel=0.1) and size["unit"] == "N s2/m2"
     test = said["edit_test"]
-    assert test["changes"] == {"sprung_mass": pytest.approx(1.0 + 4.0 / rig.sprung_mass.value, rel=1e-5)}
+    assert test["changes"] == {"sprung_mass": pytest.approx(1.0 + 4.0 / load_rig().sprung_mass.value, rel=1e-5)}
     assert test["gap_best"] < 0.4 * test["gap_refit"] and test["gap_best"] < 3 * said["gap"]["noise_floor"]
     assert "effects of your own that competed: quadratic_damping" in said["notes"]
     assert "edit test on heavier.mcap (sprung_mass +7.9 %)" in done.output.replace("\n", " ")

@@ -65,6 +65,8 @@ def diagnose(
     if tables:
         from pneumo_ros.cli.diagnose_tables import run_tables
 
+        if fit:
+            raise InputError("--tables takes no logs", value=fit[0], remedy="leave away either the logs or --tables")
         run_tables(console, output)
         return
     if not fit or output is None:
