@@ -46,7 +46,8 @@ blind: $(READY)  ## The full blind check, 240 sealed cases (hours); goes on wher
 	$(BIN)/pneumo blind diagnose $(BLIND) --workers $(WORKERS)
 	$(BIN)/pneumo blind score $(BLIND) --output docs/blind-results.md
 
-blind-ci: $(READY)  ## Six blind cases that must keep their verdicts (3 min)
+blind-ci: $(READY)  ## Six blind cases, made and diagnosed anew, that must keep their verdicts (3 min)
+	rm -rf $(BLIND)-ci
 	$(BIN)/pneumo blind make $(BLIND)-ci --set ci --workers $(WORKERS)
 	$(BIN)/pneumo blind diagnose $(BLIND)-ci --workers $(WORKERS)
 	$(BIN)/pneumo blind score $(BLIND)-ci --expect test/data/blind-ci.json

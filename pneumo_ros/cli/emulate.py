@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
     from pneumo_ros.road import Road
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 
 
 @app.command()

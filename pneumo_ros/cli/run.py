@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
     from pneumo_ros.session.plan import Tables, Values
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 FAILED = 1
 ALIASES = {"smflc": "default"}
 ROAD_CLASSES = "ABCDEFGH"
