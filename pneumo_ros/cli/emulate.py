@@ -39,6 +39,7 @@ def emulate(
 ) -> None:  # fmt: skip
     """Emulate the rig on a pseudo-terminal: plant in real time, converters, valves, watchdog, and faults."""
     import signal
+    import time
 
     from rich.console import Console
 
@@ -55,7 +56,7 @@ def emulate(
         _show_faults(console)
         return
     the_rig = load_rig(rig)
-    hello = board_identity(adc_bits=adc_bits, dac_bits=dac_bits)
+    hello = board_identity(boot_id=round(time.time()) % 2**32, adc_bits=adc_bits, dac_bits=dac_bits)
     simulation = RigSimulation(
         the_rig, _road(road, speed, seed, the_rig.wheelbase), hello, load_calibration(calibration),
         SimulationSettings(seed, converter_noise),
