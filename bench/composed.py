@@ -41,7 +41,7 @@ def main() -> None:
         on = np.zeros((len(slots), 2), dtype=bool)
         on[list(active)] = True
         return lambda: model.kernel(trim.state, commands, road, none, PERIOD, STEPS, car.body, car.front, car.rear,
-                                    car.surface, on, typical)  # fmt: skip
+                                    car.surface, on, typical, model.inner(), False)  # fmt: skip
 
     runs: dict[str, Callable[[], np.ndarray]] = {
         "plain C": c_runner(car, trim.state, commands, road),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +65,55 @@ LIMITS: dict[str, Limit] = {
     "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
 }
 
+# What an end may have of its own where the rig has one number for both, or where the command is not what happens.
+END_LIMITS: dict[str, Limit] = {
+    f"{name}_{end}": limit
+    for end in ("front", "rear")
+    for name, limit in {
+        **{name: LIMITS[name] for name in
+           ("bushing_damping", "effective_area_scale", "volume_scale", "discharge_coefficient")},
+        "outlet_area": Limit("m2", 0.0, 1e-4, "opening that the commanded outlet area of ``rig:`` really gives"),
+        "volume_slope": Limit("1", 0.2, 5.0, "factor on dV/dh about the design height"),
+        "reference_pressure": Limit("Pa", 50e3, 3e6, "absolute; where the air has the supply's temperature (Eq. 4.17)"),
+    }.items()
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that a diagnosis found in the rig; what ids, sites and parameters mean is in pneumo_ros/gap/effects.
+
+    Attributes
+    ----------
+    effect : id
+    site : "front", "rear", "both", "" (the whole rig) or a channel
+    parameters : name and value, SI
+    file : Python file that defines it; empty for an effect of the library
+    """
+
+    effect: str
+    site: str
+    parameters: tuple[tuple[str, float], ...]
+    file: str = ""
+
+    @property
+    def label(self) -> str:
+        """Id and place, for messages."""
+        return f"{self.effect} ({self.site or 'rig'})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of the list ``effects:``."""
+        out = {"effect": self.effect, "site": self.site, "parameters": dict(self.parameters)}
+        return {**out, "file": self.file} if self.file else out
+
 
 @dataclass(frozen=True)
 class Rig:
-    """Every number of the scaled half car (Table 3.4, sections 5.6 and 6.3), SI, with tolerances."""
+    """Every number of the scaled half car (Table 3.4, sections 5.6 and 6.3), SI, with tolerances.
+
+    ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a
+    simulation with them is the twin of the rig that was diagnosed. Controllers and estimators believe the numbers.
+    """
 
     name: str
     design_height: Quantity
@@ -93,6 +138,22 @@ class Rig:
     discharge_coefficient: Quantity
     displacement_noise: Quantity
     pressure_noise: Quantity
+    ends: tuple[tuple[str, float], ...] = ()
+    effects: tuple[NamedEffect, ...] = ()
+
+    @property
+    def diagnosed(self) -> bool:
+        """Whether the rig is more than the numbers of the nominal equations."""
+        return bool(self.ends or self.effects)
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What a diagnosis found beyond the numbers, one text each, for people and comparisons."""
+        ends = tuple(f"{name} {value:.6g} {END_LIMITS[name].unit}" for name, value in self.ends)
+        return (
+            *(f"{one.label}: {', '.join(f'{k} {v:.6g}' for k, v in one.parameters)}" for one in self.effects),
+            *ends,
+        )
 
     @property
     def wheelbase(self) -> float:
@@ -123,7 +184,12 @@ class Rig:
 
     def to_yaml(self) -> str:
         """The text that /rig/config carries."""
-        return yaml.safe_dump({"rig": self.to_dict()}, sort_keys=False)
+        document: dict[str, Any] = {"rig": self.to_dict()}
+        if self.ends:
+            document["ends"] = {name: {"value": value, "unit": END_LIMITS[name].unit} for name, value in self.ends}
+        if self.effects:
+            document["effects"] = [one.to_dict() for one in self.effects]
+        return yaml.safe_dump(document, sort_keys=False)
 
 
 def load_rig(path: str | Path | None = None) -> Rig:
@@ -157,18 +223,65 @@ def parse_rig(text: str, where: str = "rig") -> Rig:
         raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
     if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
         raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
-    return _from_mapping(document["rig"], where)
+    rig = _from_mapping(document["rig"], where)
+    return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
+
+
+def _ends(entries: object, where: str) -> tuple[tuple[str, float], ...]:
+    if entries is None:
+        return ()
+    if not isinstance(entries, Mapping):
+        raise InputError(
+            "not a mapping", where=where, key="ends", value=entries, remedy="write ends: {name: {value: ...}}"
+        )
+    return tuple((str(name), _end(str(name), entry, where)) for name, entry in entries.items())
+
+
+def _end(name: str, entry: object, where: str) -> float:
+    limit = END_LIMITS.get(name)
+    if limit is None:
+        raise InputError("unknown value of an end", where=where, key=f"ends.{name}", allowed=", ".join(END_LIMITS))
+    if not isinstance(entry, Mapping) or "value" not in entry or entry.get("unit", limit.unit) != limit.unit:
+        raise InputError(
+            "needs a mapping with value and unit", where=where, key=f"ends.{name}", value=entry,
+            remedy=f"write {name}: {{value: ..., unit: {limit.unit}}}",
+        )  # fmt: skip
+    value = _number(f"ends.{name}", entry["value"], where)
+    if not limit.low <= value <= limit.high:
+        allowed = f"{limit.low:g} to {limit.high:g} {limit.unit}"
+        raise InputError("value out of range", where=where, key=f"ends.{name}", value=value, allowed=allowed)
+    return value
+
+
+def _effects(entries: object, where: str) -> tuple[NamedEffect, ...]:
+    if entries is None:
+        return ()
+    if not isinstance(entries, list):
+        raise InputError("not a list", where=where, key="effects", value=entries, remedy="write it as --save-rig does")
+    return tuple(_effect(k, entry, where) for k, entry in enumerate(entries))
+
+
+def _effect(number: int, entry: object, where: str) -> NamedEffect:
+    key = f"effects[{number}]"
+    parameters = entry.get("parameters") if isinstance(entry, Mapping) else None
+    if not isinstance(entry, Mapping) or "effect" not in entry or not isinstance(parameters, Mapping):
+        raise InputError(
+            "needs effect, site and parameters", where=where, key=key, value=entry,
+            remedy="write {effect: ID, site: front|rear|both|..., parameters: {name: value}}",
+        )  # fmt: skip
+    values = tuple((str(name), _number(f"{key}.parameters.{name}", v, where)) for name, v in parameters.items())
+    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("file") or ""))
 
 
 def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
-    known = {f.name for f in fields(Rig)}
+    known = {"name", *LIMITS}
     for key in entries:
         if key not in known:
             _limit_of(str(key), where)
     base = {} if set(known) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
-    return Rig(name=name, **quantities)
+    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
 
 
 def _nominal_entries() -> dict[str, Any]:

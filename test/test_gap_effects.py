@@ -145,14 +145,14 @@ def test_lags_and_delays_are_exact_on_what_is_known() -> None:
     w = 2.0 * np.pi * 2.0
     wave = np.sin(w * t)
     for lagged, gain in (
-        (first_order_line(wave, period, 0.02), 1.0 / (1.0 + 0.02j * w)),
-        (lagged_line(wave, period, 0.015, 0.7), 1.0 / (1.0 - (0.015 * w) ** 2 + 2j * 0.7 * 0.015 * w)),
+        (first_order_line(wave, period, 0.02)[0], 1.0 / (1.0 + 0.02j * w)),
+        (lagged_line(wave, period, 0.015, 0.7)[0], 1.0 / (1.0 - (0.015 * w) ** 2 + 2j * 0.7 * 0.015 * w)),
     ):
         assert np.max(np.abs(lagged[2000:] - np.imag(gain * np.exp(1j * w * t[2000:])))) < 2e-4
     step = np.where(t > 0.5, 1.0, 0.0)
-    rising = lagged_hold(step, period, 0.02, 0.8)
+    rising, _ = lagged_hold(step, period, 0.02, 0.8)
     assert rising[-1] == pytest.approx(1.0, abs=1e-9) and rising[251] < 0.01
-    assert np.sum(delayed_hold(step, period, 0.0113)) == pytest.approx(np.sum(step) - 0.0113 / period)
+    assert np.sum(delayed_hold(step, period, 0.0113)[0]) == pytest.approx(np.sum(step) - 0.0113 / period)
 
 
 @pytest.mark.slow
@@ -181,5 +181,10 @@ def test_a_file_without_an_effect_is_refused(tmp_path: Path) -> None:
     bad.write_text("x = 1\n")
     with pytest.raises(InputError, match="defines no EFFECT"):
         load_library([bad])
+    old = tmp_path / "old.py"
+    source = Path(str(LIBRARY["lvdt_offset"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
+    old.write_text(source.replace(", values: Values, memory: Memory", ", values: Values"))
+    with pytest.raises(InputError, match=r"hook of another form.*outputs\(outputs, period, channels, values, memory\)"):
+        load_library([old])
     with pytest.raises(InputError, match="cannot load the effect"):
         load_library([tmp_path / "missing.py"])

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.main import app
-from pneumo_ros.gap.diagnose import Options
-from pneumo_ros.gap.run import diagnose_files
+from pneumo_ros.gap.diagnose import Options, held_out
+from pneumo_ros.gap.run import diagnose_files, prepared
 from pneumo_ros.rig import load_rig
 
 
@@ -47,3 +48,7 @@ def test_the_command_line_writes_all_files_and_finds_no_effect_where_there_is_no
     assert {"report.html", "residual.mcap"} <= {path.name for path in tmp_path.iterdir()}
     saved = load_rig(tmp_path / "rig.yaml")
     assert saved.tyre_stiffness_front.value != load_rig().tyre_stiffness_front.value
+    # The saved rig's own nominal is what the refit was, but for the shift of all commands, which is not the rig's.
+    twin = prepared([logs / "nominal-within-tolerance-fit.mcap"], logs / "nominal-within-tolerance-holdout.mcap", saved)
+    values = np.array([p.nominal for p in twin.model.parameters])
+    assert held_out(twin.model, twin.holdout, values, ()).total == pytest.approx(found["gap"]["refit"], rel=0.1)

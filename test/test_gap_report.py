@@ -46,7 +46,8 @@ def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
                            "notes": ["droop ended at its bound"]}],
         "ambiguity_group": ["orifice_coefficient"], "not_testable": {"bump_stop": "the spring never came near it"},
         "next_experiment": {"name": "x", "file": "next_experiment_road.csv", "description": "Open both inlets fully.",
-                            "separation": 31.0, "separation_now": 1.2},
+                            "separation": 31.0, "separation_now": 1.2,
+                            "command": "pneumo run --road a.csv --valves b.csv"},
         "edit_test": {"log": "heavier.mcap", "changes": {"sprung_mass": 1.1}, "gap_nominal": 1.3, "gap_refit": 0.5,
                       "gap_best": 0.02},
         "gap": {"nominal": 1.2, "refit": 0.4, "best": 0.01, "noise_floor": 0.0034,
@@ -95,6 +96,7 @@ def test_the_page_says_verdict_place_size_and_shrink() -> None:
     assert "0.4100 ± 0.0020" in page and "mm²" in page
     assert "orifice_coefficient: an orifice" in page
     assert "Open both inlets fully. It would drive the rivals 31 times the noise apart" in page
+    assert "<code>pneumo run --road a.csv --valves b.csv</code>" in page
     assert "droop ended at its bound" in page and "not testable here: the spring never came near it" in page
     assert "heavier.mcap (sprung mass +10.0 %): gap 1.3 nominal, 0.5 re-estimated, 0.02" in page
     assert "held&lt;out&gt;.mcap" in page and "held<out>" not in page
@@ -130,7 +132,7 @@ def test_a_pair_is_named_with_both_effects() -> None:
 def test_every_verdict_says_what_to_do_next() -> None:
     found = findings()
     first, second = next_steps(found.summary, ["a.mcap"])
-    assert "next_experiment_road.csv" in first and "a.mcap" in first
+    assert "pneumo run --road a.csv" in first and "a.mcap" in first
     assert "the front air and valve" in second and "--save-rig" in second and second in render(found)
     clear = {**found.summary, "next_experiment": None}
     assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 1, 1]

@@ -35,7 +35,12 @@ def diagnose(
     holdout: Annotated[
         Path | None, typer.Option(help="Log that nothing is fitted to; default: the last 35 % of the last fit log.")
     ] = None,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); default: the rig that the log carries.")] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML); effects it names are part of the model; default: the rig that the log carries."
+        ),
+    ] = None,
     edit: Annotated[
         Path | None,
         typer.Option(
@@ -49,7 +54,10 @@ def diagnose(
     ] = None,
     without: Annotated[list[str] | None, typer.Option(help="Effect id that must not compete, repeatable.")] = None,
     save_rig: Annotated[
-        Path | None, typer.Option(help="Write the corrected rig (YAML) here: estimated parameters and effects.")
+        Path | None,
+        typer.Option(
+            help="Write the corrected rig with its effects (YAML) here, for --rig of run, emulate, replay and diagnose."
+        ),
     ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
     tables: Annotated[
@@ -93,8 +101,11 @@ def diagnose(
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
-        files.append(save_corrected_rig(found, task.model, save_rig))
+        files.append(save_corrected_rig(found, task.model, save_rig, effect or ()))
     _show(console, found, {name: effect.summary for name, effect in task.model.library.items()}, task.fit)
+    if found.experiment is not None:
+        console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
+        console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
 
 

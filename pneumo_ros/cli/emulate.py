@@ -23,7 +23,8 @@ def emulate(
                                            "bump, flat, or a CSV file.")] = "D",
     speed: Annotated[float, typer.Option(help="Full-scale speed, km/h.")] = 80.0,
     seed: Annotated[int, typer.Option(help="Seed of road, sensor noise and line faults.")] = 1,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
+    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML), with its effects if pneumo diagnose --save-rig "
+                                                  "wrote it; the nominal rig by default.")] = None,
     calibration: Annotated[str, typer.Option(help="What the sensors and valves are really like: name or file.")]
         = "appendix_c",
     adc_bits: Annotated[int, typer.Option(min=8, max=32, help="Width of the input converter, bit.")] = 16,
@@ -49,6 +50,7 @@ def emulate(
     from pneumo_ros.daq.faults import parse_fault
     from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
     from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
+    from pneumo_ros.gap.stepped import stepped_rig
     from pneumo_ros.rig import load_rig
 
     console = Console(quiet=quiet, highlight=False)
@@ -59,7 +61,7 @@ def emulate(
     hello = board_identity(boot_id=round(time.time()) % 2**32, adc_bits=adc_bits, dac_bits=dac_bits)
     simulation = RigSimulation(
         the_rig, _road(road, speed, seed, the_rig.wheelbase), hello, load_calibration(calibration),
-        SimulationSettings(seed, converter_noise),
+        SimulationSettings(seed, converter_noise), stepped_rig(the_rig, hello.sample_period_us * 1e-6),
     )  # fmt: skip
     faults = [parse_fault(text) for text in fault or []]
     say = lambda state: console.print(f"board: {state.name.lower()}")  # noqa: E731
@@ -69,6 +71,8 @@ def emulate(
     simulation.warm_up()
     prefer_this_process()
     freeze_startup_objects()
+    if the_rig.effects:
+        console.print("with its effects: " + ", ".join(one.label for one in the_rig.effects), soft_wrap=True)
     console.print(f"emulating the rig on {link}; Ctrl-C ends it; try", soft_wrap=True)
     console.print(f"  pneumo run --source serial --port {link} --calibration {calibration}", soft_wrap=True)
     done = emulator.run(duration)

@@ -119,11 +119,13 @@ def report(
     ] = None,
 ) -> None:
     """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
+    from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.session.reading import read_log
     from pneumo_ros.session.report import write_report
+    from pneumo_ros.session.summary import load_session
 
     target = output or log.with_suffix(".html")
-    write_report(read_log(log), target)
+    write_report(read_log(log), target, passive_run(load_session(log)))
     console.print(f"report   {target}", highlight=False, soft_wrap=True)
 
 
@@ -167,6 +169,8 @@ def _show_settings(report: Report) -> None:
     table.add_row("rig", "name", report.rig or "not in the log")
     for key, (nominal, ours) in report.changed_parameters.items():
         table.add_row("rig", key, f"{ours:g} (nominal {nominal:g})")
+    for text in report.found_in_rig:
+        table.add_row("rig, as diagnosed", "", text)
     for name, entries in report.metadata:
         for key, value in entries.items():
             table.add_row(name, key, _short(value) if "\n" not in value else f"({len(value)} characters)")

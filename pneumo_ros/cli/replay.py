@@ -17,6 +17,7 @@ from rich.table import Table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
+    from pneumo_ros.rig import Rig
     from pneumo_ros.session.reading import Log
     from pneumo_ros.session.replay import Replayed
     from pneumo_ros.session.rerun import Rerun
@@ -45,6 +46,12 @@ def replay(
     diagnosis: Annotated[
         Path | None, typer.Option(help="diagnosis.json: --closed-loop runs the rig as it was diagnosed.")
     ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML) in place of the log's: --closed-loop runs it with its effects, --stepped believes it."
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the log with the replayed topics in place (.mcap).")
     ] = None,
@@ -65,10 +72,13 @@ def replay(
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
     if closed_loop or diagnosis is not None:
-        _closed_loop(found, parse_overrides(set_), diagnosis, plot)
+        _closed_loop(found, parse_overrides(set_), diagnosis, rig, plot)
     elif stepped or set_:
-        _stepped(found, parse_overrides(set_), output, plot)
+        _stepped(found, parse_overrides(set_), _believed(found, rig), output, plot)
     else:
+        if rig is not None:
+            raise InputError("a live replay publishes what was recorded and simulates no rig", where="--rig",
+                             remedy="add --closed-loop, or leave it out")  # fmt: skip
         from pneumo_ros.cli.replay_live import play
 
         play(found, rate, start, paused, loop, everything, domain_id)
@@ -94,7 +104,21 @@ def parse_overrides(texts: list[str] | None) -> dict[str, dict[str, Any]]:
     return out
 
 
-def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path | None, plot: Path | None) -> None:
+def _believed(log: Log, path: Path | None) -> Rig | None:
+    """The rig that estimator and controller believe; that its effects do nothing here is said."""
+    from pneumo_ros.rig import load_rig
+
+    rig = log.config if path is None else load_rig(path)
+    if rig is not None and rig.effects:
+        names = ", ".join(one.label for one in rig.effects)
+        text = f"the measurements are the recorded ones, so the rig's effects do nothing here: {names}"
+        console.print(f"[cyan]note[/] {text}", highlight=False, soft_wrap=True)
+    return rig
+
+
+def _stepped(
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], rig: Rig | None, output: Path | None, plot: Path | None
+) -> None:
     from pneumo_ros.session.replay import replay as step
     from pneumo_ros.session.replay import replayed_log, warm_up
     from pneumo_ros.session.rewriting import refuse_target, write_log
@@ -103,11 +127,11 @@ def _stepped(log: Log, overrides: Mapping[str, Mapping[str, Any]], output: Path 
         refuse_target(output, log.path)
     warm_up(log)
     begin = time.perf_counter()
-    result = step(log, overrides)
+    result = step(log, overrides, rig)
     took = time.perf_counter() - begin
     _show_run(result, took)
     if overrides:
-        _show_what_if(log, result, plot)
+        _show_what_if(log, result, rig, plot)
     else:
         console.print(agreement_table(result))
         if plot is not None:
@@ -146,7 +170,7 @@ def agreement_table(result: Replayed) -> Table:
     return table
 
 
-def _show_what_if(log: Log, result: Replayed, plot: Path | None) -> None:
+def _show_what_if(log: Log, result: Replayed, rig: Rig | None, plot: Path | None) -> None:
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.what_if import CAVEAT, what_if
 
@@ -154,7 +178,7 @@ def _show_what_if(log: Log, result: Replayed, plot: Path | None) -> None:
         f"{node}.{name} = {value}" for node, own in result.overridden.items() for name, value in own.items()
     )
     console.print(f"what if {changed}", highlight=False, soft_wrap=True)
-    console.print(what_if_table(what_if(result, log.config or load_rig())))
+    console.print(what_if_table(what_if(result, rig or load_rig())))
     console.print(CAVEAT, highlight=False, soft_wrap=True)
     _draw(result, plot or log.path.with_name(f"{log.path.stem}-what-if.png"), f"{log.path.name}: {changed}")
 
@@ -176,18 +200,29 @@ def _draw(result: Replayed, path: Path, title: str) -> None:
 
 
 def _closed_loop(
-    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, plot: Path | None
+    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, rig: Path | None, plot: Path | None
 ) -> None:
     from pneumo_ros.session.rerun import draw_rerun
-    from pneumo_ros.session.rerun import rerun as run_again
 
-    result = run_again(log, overrides) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
+    if diagnosis is not None and rig is not None:
+        raise InputError("two rigs at once", where="--rig", remedy="give --diagnosis or --rig")
+    result = _again(log, overrides, rig) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
     for note in result.notes:
         console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
     console.print(rerun_table(result))
     if plot is not None:
         draw_rerun(result, plot, f"{log.path.name}: its road through the rig's model in closed loop")
         console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
+
+
+def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | None) -> Rerun:
+    """From rest, on the log's rig or the given one, with its effects if it has any."""
+    from pneumo_ros.gap.stepped import stepped_rig
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.session.rerun import rerun
+
+    rig = log.config if path is None else load_rig(path)
+    return rerun(log, overrides, rig, stepped_rig if rig is not None and rig.diagnosed else None)
 
 
 def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path) -> Rerun:

@@ -17,11 +17,13 @@ from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
+    from pneumo_ros.rig import Rig
     from pneumo_ros.session.plan import Tables, Values
 
 app = typer.Typer(add_completion=False)
 FAILED = 1
-ALIASES = {"smflc": "default"}
+CONTROLLER = "smflc"
+ALIASES = {CONTROLLER: "default"}
 ROAD_CLASSES = "ABCDEFGH"
 RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
@@ -36,7 +38,13 @@ def run(
         typer.Option(
             help="smflc, passive, thesis, two_valve, area_rate_feedforward, or another of docs/parameters.md."
         ),
-    ] = "smflc",
+    ] = CONTROLLER,
+    valves: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of valve openings over time, played in open loop instead of a controller; docs/control.md."
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of road and sensor noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Control rate, Hz.")] = 500.0,
     source: Annotated[str, typer.Option(help="sim: the simulated rig; serial: the hardware.")] = "sim",
@@ -46,7 +54,12 @@ def run(
     ] = "appendix_c",
     realtime: Annotated[bool, typer.Option("--realtime", help="Absolute deadlines instead of lockstep.")] = False,
     single_process: Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")] = False,
-    rig: Annotated[Path | None, typer.Option(help="Rig file (YAML); the nominal rig by default.")] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help="Rig file (YAML), with its effects if pneumo diagnose --save-rig wrote it; the nominal rig by default."
+        ),
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
     output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
@@ -65,24 +78,40 @@ def run(
 
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
+    if valves is not None:
+        controller = _player(controller)
     options = _options(road, duration, speed, controller, seed, rate, realtime or view, source)
+    if valves is not None:
+        options.append(("controller", "valve_profile", str(valves.resolve())))
     if source == "serial":
         options += [("daq", "port", port), ("daq", "calibration", calibration)]
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
     values = {node: own for node, own in values.items() if node in session_nodes(source)}
     target = output or Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S") / "session.mcap"
-    _finish_plan(values, rig, target, {"seed": str(seed), "road": road, "controller": controller, "source": source})
+    session = {"seed": str(seed), "road": road, "controller": controller, "source": source}
+    _finish_plan(values, rig, target, session | ({} if valves is None else {"valves": str(valves)}))
     if source == "serial":
         _check_hardware(values["daq"], single_process)
-    _check(values, target)
+    checked = _check(values, target)
     console = Console()
+    if checked.effects:
+        _tell_effects(console, checked, source)
     with beside(domain_id) if view else nullcontext() as dashboard:
         _run_session(console, values, target, single_process, domain_id)
         _report(console, target, values, picture, report)
         if dashboard is not None:
             console.print("the dashboard stays until Ctrl-C")
             dashboard.wait()
+
+
+def _player(controller: str) -> str:
+    from pneumo_ros.control.half_car import PROFILE
+
+    if controller not in (CONTROLLER, PROFILE):
+        raise InputError("either a controller or a valve profile", where="--valves", key="--controller",
+                         value=controller, remedy="leave one of them out")  # fmt: skip
+    return PROFILE
 
 
 def session_nodes(source: str) -> tuple[str, ...]:
@@ -158,20 +187,51 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
     values["session_recorder"]["session"] = json.dumps({**session, "parameters": json.dumps(values)})
 
 
-def _check(values: Values, target: Path) -> None:
-    """Find every mistake before a process starts: rig, trim, road and output file."""
+def _tell_effects(console: Console, rig: Rig, source: str) -> None:
+    """Who acts on the rig's effects: the simulated rig does, the hardware has its own."""
+    names = ", ".join(one.label for one in rig.effects)
+    if source == "serial":
+        console.print(f"not simulated, for the hardware has its own: {names}; the log's rig names them", soft_wrap=True)
+    else:
+        console.print(f"the simulated rig has these effects: {names}", soft_wrap=True)
+
+
+def _check(values: Values, target: Path) -> Rig:
+    """Find every mistake before a process starts: rig, trim, effects, road and output file."""
     from pneumo_ros.plant.trim import trim
     from pneumo_ros.rig import load_rig
     from pneumo_ros.road import PARAMETERS, build_road
 
     rig = load_rig(str(values["road_profile"].get("rig", "")) or None)
     trim(rig)
+    if rig.effects:
+        from pneumo_ros.gap.standing import library_of, standing_effects
+
+        standing_effects(rig, library_of(rig))
+    _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, where="road")
     if target.suffix != ".mcap":
         raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
     if target.exists():
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
+    return rig
+
+
+def _check_profile(values: Values, rig: Rig) -> None:
+    """The valve profile, if one is played, against the rig and, on hardware, against the driver's own limits."""
+    from pneumo_ros.control.half_car import PROFILE
+    from pneumo_ros.daq.safety_config import load_safety
+    from pneumo_ros.plant.trim import trim
+    from pneumo_ros.valve_profile import read_profile
+
+    if values["controller"].get("controller") != PROFILE:
+        return
+    largest = rig.inlet_area_max.value
+    if "daq" in values:
+        safety = load_safety(str(values["daq"].get("safety", "")) or None)
+        largest = min(largest, safety.limits["command_area"].trip_high)
+    read_profile(str(values["controller"].get("valve_profile", "")), trim(rig).command, largest)
 
 
 def _check_hardware(own: dict[str, Value], single_process: bool) -> None:
@@ -244,11 +304,11 @@ def _save_what_is_left(target: Path) -> None:
 
 def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
-    from pneumo_ros.session.passive import passive_twin
+    from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
     session = load_session(target)
-    other = passive_twin(session) if len(session.truth) > 1 and len(session.road) > 1 else None
+    other = passive_run(session)
     ours = summarise(session, loop_timing(target), wall_time(target))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))

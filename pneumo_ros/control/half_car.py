@@ -29,6 +29,7 @@ from pneumo_ros.control.laws.common import Error, Gains
 from pneumo_ros.control.laws.family import FLC, LAWS, wanted_jerk
 from pneumo_ros.control.linearisation import Compensation, Spring, believed_volume, force_rates, openings
 from pneumo_ros.control.reference_model import advance_reference, reference_jerk
+from pneumo_ros.errors import InputError
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import COMMAND_NAMES, HEAVE, PITCH, gas_of, unpack_gas
@@ -44,10 +45,25 @@ VARIANTS: dict[str, tuple[str, bool, bool]] = {  # law, dA/dt fed forward, outle
     "two_valve": ("first_order_smflc", True, True),
 }
 CONTROLLERS = ("passive", *VARIANTS)
+PROFILE = "profile"  # no controller: a table of openings is played, see pneumo_ros.control.profile
 TELEMETRY_NAMES = ("surface_heave", "surface_pitch", "inlet_front_unclipped", "inlet_rear_unclipped")
 
 PARAMETERS: tuple[Parameter, ...] = (
-    Parameter("controller", "first_order_smflc", "", "which controller", choices=CONTROLLERS, read_only=True),
+    Parameter(
+        "controller",
+        "first_order_smflc",
+        "",
+        "which controller; profile plays valve_profile, open loop",
+        choices=(*CONTROLLERS, PROFILE),
+        read_only=True,
+    ),
+    Parameter(
+        "valve_profile",
+        "",
+        "",
+        "CSV file with time_s and openings such as front_inlet_m2, for the controller 'profile'",
+        read_only=True,
+    ),
     Parameter(
         "pole", 10.0, "1/s", "lambda: triple pole of the error's dynamics and of the sliding surface", 0.5, 200.0
     ),
@@ -175,6 +191,9 @@ def build_controller(
     """A controller for a rig from parameters (names of :data:`PARAMETERS`), stepped every ``period`` s."""
     v = settings(PARAMETERS, values, where)
     name = str(v["controller"])
+    if name == PROFILE:
+        raise InputError("a valve profile is played in open loop", where=where, key="controller", value=name,
+                         allowed=", ".join(CONTROLLERS))  # fmt: skip
     at_rest = trim(rig)
     law = _law(rig, at_rest, name, v, period)
     front, rear = (gas_of(rig, pressure) for pressure in at_rest.pressures)

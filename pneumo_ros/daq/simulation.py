@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from pneumo_ros.daq.calibration import SENSORS, Calibration
 from pneumo_ros.daq.frames import Hello
 from pneumo_ros.daq.scaling import input_scale, output_scale
-from pneumo_ros.plant.half_car import half_car
-from pneumo_ros.plant.sensors import read_channels
-from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.rig import Rig
 from pneumo_ros.road import Road
 
@@ -44,16 +42,23 @@ class RigSimulation:
     road : what the shaker plays once :meth:`start_road` was called; flat before
     hello : ranges and widths of the board's converters
     calibration : of the sensors and valves as they really are
+    stepped : the rig with effects, stepped at the board's sample period; the nominal equations of ``rig`` without
     """
 
     def __init__(
-        self, rig: Rig, road: Road, hello: Hello, calibration: Calibration, settings: SimulationSettings
+        self,
+        rig: Rig,
+        road: Road,
+        hello: Hello,
+        calibration: Calibration,
+        settings: SimulationSettings,
+        stepped: SteppedRig | None = None,
     ) -> None:
         self.rig, self.hello, self.settings = rig, hello, settings
-        self.car, self.trim = nominal_half_car(rig)
-        self.state = self.trim.state
-        self.supply = rig.supply_pressure.value
         self.period = hello.sample_period_us * 1e-6
+        self.stepped = plain_rig(rig, self.period) if stepped is None else stepped
+        self._state = self.stepped.init()
+        self.supply = rig.supply_pressure.value
         self._inputs = input_scale(calibration, hello, rig.ambient_pressure.value)
         self._outputs = output_scale(calibration, hello)
         self._rng = np.random.default_rng(settings.seed)
@@ -76,16 +81,20 @@ class RigSimulation:
         """Another supply pressure, Pa absolute, from now on."""
         if pressure != self.supply:
             self.supply = pressure
-            rig = self.rig.with_values(supply_pressure=pressure)
-            self.car = half_car(rig, self.trim.pressures, self.car.surface)
+            self.stepped = self.stepped.with_supply(pressure)
 
     def advance(self) -> None:
         """One sample period passes."""
-        self.state = self.car.advance(self.state, self._areas, self._road_ends(), self.period)
+        self._state = self.stepped.step(self._state, self._areas, self._road_ends())
+
+    @property
+    def state(self) -> NDArray[np.float64]:
+        """(10,) of :mod:`pneumo_ros.plant.half_car`."""
+        return self.stepped.plant_state(self._state)
 
     def values(self) -> list[float]:
         """Noise-free readings in the order of SENSORS, m and Pa absolute."""
-        return [*read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm), self.supply]
+        return [*self.stepped.read(self._state), self.stepped.supply(self._state)]
 
     def convert(self, values: Sequence[float]) -> tuple[int, ...]:
         """Counts in the board's order: sensor noise, inverse calibration, converter noise, rounding, rails."""
@@ -103,7 +112,7 @@ class RigSimulation:
 
     def warm_up(self) -> None:
         """Compile what the first period needs, so that it is not late."""
-        self.car.advance(self.state, self._areas, np.zeros((2, 2)), self.period)
+        self.stepped.step(self._state, self._areas, np.zeros((2, 2)))
         self._road.sample(np.zeros(1))
 
     def rail(self, side: str) -> int:

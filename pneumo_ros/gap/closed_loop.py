@@ -1,15 +1,11 @@
 """A log's road through the rig *as diagnosed*, in closed loop: what other gains would do on the rig with its effects.
 
-The composed model simulates whole records, with the effects' inner states inside. Closing the loop around it goes
-window by window: guess the commands of a window, simulate up to its end, let estimator and controller answer, repeat
-until the commands no longer change. Row i of the model depends on commands before row i alone, so the fixed point is
-the exact closed loop, reached after as many rounds as the window has rows at the latest; in practice a handful.
+The twin (:mod:`pneumo_ros.gap.twin_rig`) is stepped period by period, estimator and controller as a session runs them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,13 +15,11 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.standing import library_of
+from pneumo_ros.gap.twin_rig import TwinRig
 from pneumo_ros.parameters import Value
-from pneumo_ros.plant.trim import trim
-from pneumo_ros.session.rerun import Rerun
+from pneumo_ros.session.rerun import Rerun, close_stepped
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage
-
-WINDOW = 40  # rows: shorter simulates the past more often, longer needs more rounds
-_INLETS_AND_OUTLETS = 4
 
 
 def rerun_diagnosed(
@@ -51,7 +45,7 @@ def rerun_diagnosed(
     InputError
         if the diagnosis names no effects or one that is not in the library.
     """
-    rig_model = model or RigModel(signals.rig)
+    rig_model = model or RigModel(signals.rig, library_of(signals.rig))
     active = active_of(diagnosis, rig_model)
     nuisance = nuisance_of(diagnosis, rig_model)
     stages = (
@@ -59,12 +53,11 @@ def rerun_diagnosed(
         ControllerStage(signals.rig, signals.period, controller),
     )
     noise = np.random.default_rng(seed).standard_normal(signals.measured.shape) * signals.noise_stated
-    loop = _Loop(rig_model, signals, active, nuisance, stages, noise)
-    for begin in range(0, len(signals.measured), WINDOW):
-        loop.close(begin, min(begin + WINDOW, len(signals.measured)))
-    names = ", ".join(f"{a.effect} ({a.site or 'rig'})" for a in active) or "no effect"
-    notes = (f"the rig as diagnosed: {names}", "the run starts from the measured state at the log's first sample")
-    return Rerun(signals.time, loop.channels, loop.commands, signals.time, signals.measured, notes)
+    start = rig_model.initial(signals, active)[0]
+    twin = TwinRig(rig_model, signals.period, nuisance, active, start)
+    channels, commands = close_stepped(twin, stages, signals.road, noise)
+    notes = (f"the rig as diagnosed: {twin.names}", "the run starts from the measured state at the log's first sample")
+    return Rerun(signals.time, channels, commands, signals.time, signals.measured, notes)
 
 
 def active_of(diagnosis: Mapping[str, Any], model: RigModel) -> tuple[Active, ...]:
@@ -98,48 +91,3 @@ def nuisance_of(diagnosis: Mapping[str, Any], model: RigModel) -> NDArray[np.flo
         late = parameter.unit == "s"
         values.append(parameter.nominal if entry is None or late else float(entry["value"]))
     return np.array(values)
-
-
-class _Loop:
-    """The loop being closed, window by window."""
-
-    def __init__(
-        self,
-        model: RigModel,
-        signals: Signals,
-        active: tuple[Active, ...],
-        nuisance: NDArray[np.float64],
-        stages: tuple[EstimatorStage, ControllerStage],
-        noise: NDArray[np.float64],
-    ) -> None:
-        self._model, self._active, self._nuisance, self._noise = model, active, nuisance, noise
-        self._estimator, self._controller = stages
-        self.commands = np.tile(trim(signals.rig).command, (len(signals.measured), 1))
-        self.channels = np.zeros_like(signals.measured)
-        self._record = replace(signals, commands=self.commands)
-        self._states: tuple[Any, Any] | None = None
-
-    def close(self, begin: int, end: int) -> None:
-        """Rows begin <= i < end."""
-        self.commands[begin:end] = self.commands[max(begin - 1, 0)]
-        for _ in range(end - begin + 1):
-            out = self._model.simulate(self._record, self._nuisance, None, self._active, rows=end)
-            self.channels[begin:end] = out[begin:end] + self._noise[begin:end]
-            answers, states = self._answer(begin, end)
-            settled = np.array_equal(answers, self.commands[begin:end])
-            self.commands[begin:end] = answers
-            if settled:
-                break
-        self._states = states
-
-    def _answer(self, begin: int, end: int) -> tuple[NDArray[np.float64], tuple[Any, Any]]:
-        """Commands of the window's rows, and the states after it."""
-        seen, commanded = self._states or (None, None)
-        answers = np.empty((end - begin, _INLETS_AND_OUTLETS))
-        for i, sample in enumerate(self.channels[begin:end]):
-            seen = self._estimator.first(sample) if seen is None else seen
-            seen, estimate = self._estimator.step(seen, sample)
-            commanded = self._controller.first(estimate.values) if commanded is None else commanded
-            commanded, command = self._controller.step(commanded, estimate.values)
-            answers[i] = command.values
-        return answers, (seen, commanded)

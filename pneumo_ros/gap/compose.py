@@ -94,7 +94,9 @@ def compose(slots: Sequence[Slot]) -> Compiled:
     """The kernel of these terms, compiled at its first call (and from disk ever after).
 
     Signature: (x0 (10,), commands (N, 4), road (N + 1, 2), correction (0 or N, 9), period, steps, body, front, rear,
-    surface, on (K, 2) bool, values (K, 2, M)) -> states (N + 1, 10); rows after a divergence are NaN.
+    surface, on (K, 2) bool, values (K, 2, M), inner (K, 2, S), resume) -> states (N + 1, 10); rows after a divergence
+    are NaN. ``inner`` is where the terms' own states end; with ``resume`` they begin there instead of at rest, so that
+    one period after the other gives what all of them in one call give.
     """
     kernel: Compiled = _load(_source(slots), tuple(_files(slots))).simulate
     return kernel
@@ -142,8 +144,9 @@ def _files(slots: Sequence[Slot]) -> list[str]:
 
 
 def _source(slots: Sequence[Slot]) -> str:
-    return "\n".join([_imports(slots), _HEAD, *_unpack(slots), _FIRST, *_start(slots), _LOOP, *_advance(slots),
-                      *_supply(slots), _STAGES, *_hooks(slots), _TAIL, ""])  # fmt: skip
+    return "\n".join([_imports(slots), _HEAD, *_unpack(slots), _FIRST, *_start(slots), *_resume(slots), _LOOP,
+                      *_advance(slots), *_supply(slots), _SAG.format(indent=" " * 12), _STAGES, *_hooks(slots), _TAIL,
+                      *_store(slots), ""])  # fmt: skip
 
 
 def _imports(slots: Sequence[Slot]) -> str:
@@ -172,6 +175,27 @@ def _unpack(slots: Sequence[Slot]) -> list[str]:
     return lines
 
 
+def _resume(slots: Sequence[Slot]) -> list[str]:
+    """The terms' states, and the sag they make of the supply, as the call before left them."""
+    lines = ["    if resume:", "        drop = 0.0"]
+    for k, slot in enumerate(slots):
+        for s, side in enumerate(_sides(slot) if slot.term.states else ()):
+            kept = "".join(f"inner[{k}, {s}, {m}], " for m in range(slot.term.states))
+            lines.append(f"        z{k}{side} = ({kept})")
+        if slot.term.supply is not None:
+            lines += [f"        if on{k}f:", f"            drop += supply_{k}(z{k}f, p{k}f)"]
+    return [*lines, _SAG.format(indent=" " * 8)]
+
+
+def _store(slots: Sequence[Slot]) -> list[str]:
+    return [
+        f"    inner[{k}, {s}, {m}] = z{k}{side}[{m}]"
+        for k, slot in enumerate(slots)
+        for s, side in enumerate(_sides(slot))
+        for m in range(slot.term.states)
+    ] + ["    return out"]
+
+
 def _start(slots: Sequence[Slot]) -> list[str]:
     lines = []
     for k, slot in enumerate(slots):
@@ -179,7 +203,7 @@ def _start(slots: Sequence[Slot]) -> list[str]:
             continue
         for side in _sides(slot):
             args = "air_f, air_r" if slot.term.shared else f"strut_{side}, air_{side}, tyre_{side}"
-            lines += [f"    if on{k}{side}:", f"        z{k}{side} = start_{k}({args}, p{k}{side})"]
+            lines += [f"    if on{k}{side} and not resume:", f"        z{k}{side} = start_{k}({args}, p{k}{side})"]
     return lines
 
 
@@ -246,7 +270,8 @@ def ends(x, u0, u1, u2, u3, rf, rr, rf_rate, rr_rate, sf, sr, qf, qr, body, fron
 
 
 @njit(cache=True, error_model="numpy")
-def simulate(x0, commands, road, correction, period, steps, body, front, rear, surface, on, values):
+def simulate(x0, commands, road, correction, period, steps, body, front, rear, surface, on, values,
+             inner, resume):
     """RK4 over N periods with the active terms."""
     count = commands.shape[0]
     out = np.empty((count + 1, 10))
@@ -280,12 +305,14 @@ _LOOP = """
                 strut_f, strut_r, air_f, air_r, tyre_f, tyre_r = ends(
                     x, u0, u1, u2, u3, f0, r0, vf, vr, sf, sr, qf, qr, body, front, rear, surface)"""
 
-_STAGES = """
-            if drop != was:
-                sf, sr = sag[0] - drop, sag[1] - drop
-                qf = (front.reference_pressure / sf) ** front.k
-                qr = (rear.reference_pressure / sr) ** rear.k
-                was = drop
+_SAG = """\
+{indent}if drop != was:
+{indent}    sf, sr = sag[0] - drop, sag[1] - drop
+{indent}    qf = (front.reference_pressure / sf) ** front.k
+{indent}    qr = (rear.reference_pressure / sr) ** rear.k
+{indent}    was = drop"""
+
+_STAGES = """\
             y = x
             a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = a8 = a9 = 0.0
             for stage in range(4):
@@ -325,6 +352,4 @@ _TAIL = """
             out[i + 1 :] = np.nan
             return out
         for m in range(10):
-            out[i + 1, m] = x[m]
-    return out
-"""
+            out[i + 1, m] = x[m]"""

@@ -120,10 +120,11 @@ class Experiment:
     valves: Array  # (N, 4) m2
 
     def write(self, folder: Path) -> list[Path]:
-        """The profile as two tables: a road that ``pneumo run --road`` plays, and the valves' openings."""
+        """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""
+        columns_of = "time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2"
         tables = {
             ROAD_FILE: ("time_s,front_m,rear_m", self.road),
-            VALVE_FILE: ("time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2", self.valves),
+            VALVE_FILE: (f"# interpolation: held\n{columns_of}", self.valves),
         }
         for name, (header, columns) in tables.items():
             part = folder / f"{name}.part"
@@ -131,11 +132,20 @@ class Experiment:
             part.replace(folder / name)
         return [folder / name for name in tables]
 
+    def command(self, folder: Path = Path()) -> str:
+        """What plays both tables of a folder."""
+        files = f"--road {folder / ROAD_FILE} --valves {folder / VALVE_FILE}"
+        step = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
+        return f"pneumo run {files} --duration {float(self.time[-1]) + step:g}"
+
     def to_json(self) -> dict[str, Any]:
         """Without the profile, which has files of its own."""
+        aim = f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)"
         return {
-            "text": f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)",
+            "text": f"{aim}; {self.command()} plays it",
+            "command": self.command(),
             "file": ROAD_FILE,
+            "valve_file": VALVE_FILE,
             "name": self.name,
             "description": self.description,
             "separation": self.separation,

@@ -1,10 +1,13 @@
 """The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
 kernel.
+
+Effects that the rig's own configuration names (:attr:`RigModel.standing`) are in every simulation, before those that
+are asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -17,12 +20,14 @@ from pneumo_ros.gap.effects.base import (
     SENSOR_PLACES,
     Effect,
     Inputs,
+    Memory,
     Plant,
     channels_of,
     ends_of,
 )
 from pneumo_ros.gap.effects.loading import load_library
 from pneumo_ros.gap.model import Active, Array, Mask, Parameter
+from pneumo_ros.gap.standing import standing_effects
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
 from pneumo_ros.plant.trim import trim
@@ -40,7 +45,8 @@ SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
 COMMAND_DELAY = "command_delay"
 COMMAND_DELAY_STD = 4e-4  # s
 SLOPE_SHARE = 0.5  # of the volume scale's tolerance, for the slope of V(h) about the design height
-_NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
+Memories = tuple[Memory, ...]  # one an effect; empty before the first block
+NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 # Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. Beside them
 # the slope of V(h) has a tolerance of its own: a common factor alone would make V/(dV/dh), the air's stiffness, exact.
@@ -88,20 +94,41 @@ class RigModel:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Nuisance parameters; a quantity without tolerance is exact and stays."""
-        found = []
+        found, own = [], dict(self.rig.ends)
         for name, source in NUISANCE.items():
             q = getattr(self.rig, source)
             if q.std > 0.0:
-                found.append(Parameter(name, q.unit, q.value, q.std))
+                found.append(Parameter(name, q.unit, own.get(name, q.value), q.std))
         slope = SLOPE_SHARE * self.rig.volume_scale.std
-        found += [Parameter(f"volume_slope_{end}", "1", 1.0, slope) for end in ("front", "rear") if slope > 0.0]
+        slopes = [f"volume_slope_{end}" for end in ("front", "rear")] if slope > 0.0 else []
+        found += [Parameter(name, "1", own.get(name, 1.0), slope) for name in slopes]
         found.append(Parameter(COMMAND_DELAY, "s", 0.0, COMMAND_DELAY_STD))
         return tuple(found)
 
     @cached_property
     def effects(self) -> Mapping[str, Effect]:
-        """The effects that compete."""
-        return {name: effect for name, effect in self.library.items() if name not in self.withheld}
+        """The effects that compete, at the sites that are left to them.
+
+        The kernel has one place for a term at an end: where a standing effect has taken it, no second one can compete.
+        """
+        free = {name: self._free(effect) for name, effect in self.library.items() if name not in self.withheld}
+        return {name: effect for name, effect in free.items() if effect.sites}
+
+    def _free(self, effect: Effect) -> Effect:
+        taken = [ends_of(one.site) for one in self.standing if one.effect == effect.id and effect.term is not None]
+        sites = [s for s in effect.sites if not any(a and b for t in taken for a, b in zip(ends_of(s), t, strict=True))]
+        return effect if len(sites) == len(effect.sites) else replace(effect, sites=tuple(sites))
+
+    @cached_property
+    def standing(self) -> tuple[Active, ...]:
+        """The effects that the rig's configuration names.
+
+        Raises
+        ------
+        InputError
+            if one is not in the library, or its site, parameters or place in the kernel cannot be.
+        """
+        return standing_effects(self.rig, self.library)
 
     def places(self, active: Active) -> tuple[str, ...]:
         """Places touched, first the one blamed."""
@@ -120,7 +147,7 @@ class RigModel:
         """State at the record's first row: the measured one, seen through the active sensor effects."""
         state = np.asarray(record.initial, dtype=float)
         channels, rates = _channels(state, self._base.body), _ends_rates(state, self._base.body)
-        for one in active:
+        for one in reversed((*self.standing, *active)):
             effect = self.library[one.effect]
             if effect.undo is not None:
                 channels = effect.undo(channels.reshape(1, -1), channels_of(one.site), one.values)[0]
@@ -146,11 +173,31 @@ class RigModel:
         states = self.states(record, nuisance, initial, active, correction, rows)
         plant = self.plant(nuisance, active)
         out = _channels(states, plant.body)
-        for one in active:
+        return self.sensed(out, record.period, active)[0]
+
+    def sensed(
+        self, channels: Array, period: float, active: Sequence[Active] = (), memory: Memories = ()
+    ) -> tuple[Array, Memories]:
+        """What the sensors make of a block of rows (N, 6), and what their effects keep for the next block."""
+        kept = []
+        for one, before in _with_memory((*self.standing, *active), memory):
             effect = self.library[one.effect]
             if effect.outputs is not None:
-                out = effect.outputs(out, record.period, channels_of(one.site), one.values)
-        return out
+                channels, before = effect.outputs(channels, period, channels_of(one.site), one.values, before)
+            kept.append(before)
+        return channels, tuple(kept)
+
+    def driven(
+        self, inputs: Inputs, period: float, active: Sequence[Active] = (), memory: Memories = ()
+    ) -> tuple[Inputs, Memories]:
+        """What of a block of commands and road acts on the plant, and what the effects keep for the next block."""
+        kept = []
+        for one, before in _with_memory((*self.standing, *active), memory):
+            effect = self.library[one.effect]
+            if effect.inputs is not None:
+                inputs, before = effect.inputs(inputs, period, ends_of(one.site), one.values, before)
+            kept.append(before)
+        return inputs, tuple(kept)
 
     def simulate_channels(self, state: Array) -> Array:
         """What ideal sensors show of one state, (6,)."""
@@ -171,20 +218,18 @@ class RigModel:
         if nuisance is not None:
             late = float(nuisance[[p.name for p in self.parameters].index(COMMAND_DELAY)])
             inputs = inputs._replace(commands=_shifted(inputs.commands, late / record.period))
-        for one in active:
-            effect = self.library[one.effect]
-            if effect.inputs is not None:
-                inputs = effect.inputs(inputs, record.period, ends_of(one.site), one.values)
+        inputs = self.driven(inputs, record.period, active)[0]
         start = self.initial(record, active)[0] if initial is None else initial
         plant = self.plant(nuisance, active)
-        steps = 1 if self.step < record.period <= COARSEST else substeps(record.period, self.step)
+        steps = 1 if FIT_STEP <= self.step < record.period <= COARSEST else substeps(record.period, self.step)
         commands, road = np.ascontiguousarray(inputs.commands), np.ascontiguousarray(inputs.road)
-        terms = [one for one in active if self.library[one.effect].term is not None]
+        terms = self.terms(active)
         if not terms and correction is None:
             return simulate(start, commands, road, record.period, steps, *plant, self.surface)
-        held = _NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
-        on, values = self._switches(terms)
-        return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values)
+        held = NO_CORRECTION if correction is None else np.ascontiguousarray(correction[: count - 1])
+        on, values = self.switches(terms)
+        return self.kernel(start, commands, road, held, record.period, steps, *plant, self.surface, on, values,
+                           self.inner(), False)  # fmt: skip
 
     def coarse(self, record: Signals) -> Signals:
         """Every other row, commands averaged in pairs: half the steps, true to 1 % of a sensitivity."""
@@ -224,8 +269,8 @@ class RigModel:
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""
         v = {} if nuisance is None else dict(zip((p.name for p in self.parameters), map(float, nuisance), strict=True))
-        plant = _plant(self.rig, self._base, v)
-        for one in active:
+        plant = _plant(self.rig, self._base, {**dict(self.rig.ends), **v})
+        for one in (*self.standing, *active):
             effect = self.library[one.effect]
             if effect.plant is not None:
                 plant = effect.plant(plant, ends_of(one.site), one.values)
@@ -247,7 +292,16 @@ class RigModel:
     def _base(self) -> HalfCar:
         return _base(self.rig, self.step)
 
-    def _switches(self, terms: Sequence[Active]) -> tuple[Mask, Array]:
+    def terms(self, active: Sequence[Active] = ()) -> list[Active]:
+        """Those that act inside the kernel, the standing ones first."""
+        return [one for one in (*self.standing, *active) if self.library[one.effect].term is not None]
+
+    def inner(self) -> Array:
+        """Room for the states of the kernel's terms, (K, 2, S)."""
+        return np.zeros((max(1, len(self.slots)), 2, max([1, *(slot.term.states for slot in self.slots)])))
+
+    def switches(self, terms: Sequence[Active]) -> tuple[Mask, Array]:
+        """Which terms act at which end, (K, 2), and their parameters (K, 2, M), as the kernel takes them."""
         slots = {slot.name: k for k, slot in enumerate(self.slots)}
         on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
         values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in self.slots)])))
@@ -265,7 +319,14 @@ def _kernel(slots: tuple[Slot, ...]) -> Compiled:
 
 @lru_cache(maxsize=32)
 def _base(rig: Rig, step: float) -> HalfCar:
-    return half_car(rig, trim(rig).pressures, step=step)
+    own = dict(rig.ends)
+    given = [own.get(f"reference_pressure_{end}") for end in ("front", "rear")]
+    front, rear = (v if v is not None else trim(rig).pressures[k] for k, v in enumerate(given))
+    return half_car(rig, (front, rear), step=step)
+
+
+def _with_memory(active: Sequence[Active], memory: Memories) -> Iterator[tuple[Active, Memory]]:
+    return zip(active, memory or (None,) * len(active), strict=True)
 
 
 def _shifted(commands: Array, samples: float) -> Array:

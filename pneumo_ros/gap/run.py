@@ -14,10 +14,10 @@ from pneumo_ros.gap.compete import Progress
 from pneumo_ros.gap.diagnose import Options, Whereabouts, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
 from pneumo_ros.gap.effects.base import Effect
-from pneumo_ros.gap.effects.loading import load_library
 from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
+from pneumo_ros.gap.standing import library_of
 from pneumo_ros.gap.where import Start, locate
 from pneumo_ros.rig import Rig
 
@@ -67,12 +67,14 @@ def prepared(
     """
     if not fit:
         raise InputError("no log to fit", remedy="give at least one log")
-    library = load_library(effects)
+    first = read_signals(fit[0], rig)
+    library = library_of(first.rig, effects)
     for name in without:
         if name not in library:
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
-    logs = [read_signals(path, rig) for path in fit]
-    notes = _outside(library)
+    logs = [first, *(read_signals(path, rig) for path in fit[1:])]
+    model = RigModel(first.rig, library, frozenset(without))
+    notes = [*_outside(library), *_standing_notes(model)]
     if holdout is None:
         check_pair(logs, None)
         logs, held = split_by_time(logs)
@@ -80,7 +82,6 @@ def prepared(
     else:
         held = read_signals(holdout, rig)
         check_pair(logs, held)
-    model = RigModel(logs[0].rig, library, frozenset(without))
     _check_runs(model, [*logs, held])
     changed = None if edit is None else read_signals(edit)
     if changed is not None:
@@ -114,6 +115,23 @@ def _about_edit(model: RigModel, edit: Signals) -> list[str]:
             f"{edit.name}: its configuration states no change of the rig, so the edit test is one more held-out log"
         )
     return notes
+
+
+def _standing_notes(model: RigModel) -> tuple[str, ...]:
+    """What the rig's configuration brings into the model beyond the nominal equations.
+
+    Raises
+    ------
+    InputError
+        if it names an effect that cannot be.
+    """
+    if not model.standing:
+        return ()
+    names = ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in model.standing)
+    return (
+        f"the rig's configuration names {names}: part of the model as stated there, of 'nominal' and 'refit' too; what "
+        "competes is what the logs show beyond it",
+    )
 
 
 def diagnose_files(

@@ -7,11 +7,13 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 from rclpy.context import Context
+from std_msgs.msg import String
 
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
-from pneumo_ros.control.half_car import Controller, build_controller
+from pneumo_ros.control.profile import Commander, ProfilePlayer, build_commander
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
@@ -31,7 +33,7 @@ WATCH_PERIOD = 0.004  # s between looks at the estimate's age, real time only
 
 
 class ControllerNode(RigNode):
-    """Thin shell over :mod:`pneumo_ros.control.half_car`.
+    """Thin shell over :mod:`pneumo_ros.control.half_car`, or over a valve profile that is played instead.
 
     In real time it is the first of three watchdogs: without a fresh estimate it sends the safe command, whatever the
     driver and the board behind it do.
@@ -51,7 +53,7 @@ class ControllerNode(RigNode):
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
-        self._last_ns = self._last_stamp = 0
+        self._last_ns = self._last_stamp = self._first_stamp = 0
         self._refused = 0
         self._stale = False
         safety = load_safety(self.values["safety"] or None)
@@ -60,19 +62,29 @@ class ControllerNode(RigNode):
             self.create_timer(WATCH_PERIOD, self._watch)
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
-    def _build(self) -> Controller:
+    def _build(self) -> Commander:
         values = {p.name: self.values[p.name] for p in CONTROL_PARAMETERS}
-        return build_controller(self.rig, self.period_ns * 1e-9, values, self.get_name())
+        return build_commander(self.rig, self.period_ns * 1e-9, values, self.get_name())
 
     def on_parameters(self, changed: Mapping[str, Value]) -> None:
         """Rebuild with the new gains; the state goes on, so a change is bumpless."""
         self.controller = self._build()
+
+    def publish_setup(self) -> None:
+        """Parameters, and which profile is played."""
+        super().publish_setup()
+        if isinstance(self.controller, ProfilePlayer):
+            played = {"node": self.get_name(), "valves": self.controller.profile.describe()}
+            self._setup.publish(String(data=yaml.safe_dump(played, sort_keys=False)))
 
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, estimate = self._read(data)
         if self.state is None or not self.continues(stamp, self._last_stamp):
             self.state = self.controller.init(estimate)
+        if isinstance(self.controller, ProfilePlayer):
+            self._first_stamp = self._first_stamp or stamp
+            self.state = self.controller.placed(self.state, round((stamp - self._first_stamp) / self.period_ns))
         self._last_ns, self._last_stamp, self._stale = start, stamp, False
         state, command, telemetry = self.controller.step(self.state, estimate)
         if math.isfinite(command[0] + command[1] + command[2] + command[3]):

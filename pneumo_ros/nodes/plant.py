@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
+from pneumo_ros.gap.stepped import stepped_rig
 from pneumo_ros.nodes.base import OK, RigNode
 from pneumo_ros.nodes.emergency_stop import EmergencyStop
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.plant.sensors import NoiseSource, read_channels, truth
-from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.plant.sensors import NoiseSource
+from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 from pneumo_ros.session import topics
 from pneumo_ros.session.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
@@ -34,13 +35,13 @@ PARAMETERS: tuple[Parameter, ...] = (
 
 
 class PlantNode(RigNode):
-    """Thin shell over :mod:`pneumo_ros.plant.half_car`."""
+    """Thin shell over :mod:`pneumo_ros.plant.stepping`: the nominal equations, or the rig as it was diagnosed."""
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         super().__init__("plant", PARAMETERS, context=context, overrides=overrides)
         self.rig = load_rig(self.values["rig"] or None)
-        self.car, trim = nominal_half_car(self.rig)
-        self.state, self.command = trim.state, trim.command
+        self.stepped = stepped_rig(self.rig, self.period_ns / SECOND)
+        self.state, self.command = self.stepped.init(), trim(self.rig).command
         self.noise = NoiseSource(self.rig, self.values["seed"])
         self.last = round(self.values["duration"] * self.values["rate_hz"])
         self.index = -1
@@ -53,8 +54,7 @@ class PlantNode(RigNode):
         self._make_topics()
         self.estop = EmergencyStop(self)
         # Load the compiled code now: the first period of a real-time session is as short as the others.
-        self.car.advance(self.state, self.command, self.road, 1e-3)
-        truth(self.car, self.state, self.command, self.road[1])
+        self.stepped.truth(self.stepped.step(self.state, self.command, self.road), self.command, self.road[1])
 
     def _make_topics(self) -> None:
         variance = self.rig.pressure_noise.value**2
@@ -86,7 +86,8 @@ class PlantNode(RigNode):
             self.start_ns = time.time_ns()
             self._deadlines = Deadlines(time.monotonic_ns(), self.period_ns)
             self.create_timer(self.period_ns / SECOND, self._tick)
-        self.event(OK, "session_started", "first sample", {"start_ns": str(self.start_ns)})
+        found = {"effects": ", ".join(one.label for one in self.rig.effects)} if self.rig.effects else {}
+        self.event(OK, "session_started", "first sample", {"start_ns": str(self.start_ns), **found})
         self._publish_sample()
 
     # -- lockstep --------------------------------------------------------------------------------------------------
@@ -132,7 +133,7 @@ class PlantNode(RigNode):
         # Skipped periods are simulated, so that the rig keeps pace with the clock; nobody measures in them.
         for _ in range(deadlines.advance(start)):
             self._pass_road()
-            self.state = self.car.advance(self.state, self.command, self.road, self.period_ns / SECOND)
+            self.state = self.stepped.step(self.state, self.command, self.road)
             self.index += 1
         self._pass_road()
         self._step()
@@ -148,7 +149,7 @@ class PlantNode(RigNode):
     # -- both ------------------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        self.state = self.car.advance(self.state, self.command, self.road, self.period_ns / SECOND)
+        self.state = self.stepped.step(self.state, self.command, self.road)
         self.index += 1
         self._publish_sample()
         if self.last and self.index >= self.last:
@@ -157,17 +158,15 @@ class PlantNode(RigNode):
     def _publish_sample(self) -> None:
         stamp = self.stamp(self.index)
         noise = self.noise.next()
-        exact = read_channels(self.state, self.car.body.front_arm, self.car.body.rear_arm)
-        values = [e + n for e, n in zip(exact, noise, strict=True)]
+        values = [e + n for e, n in zip(self.stepped.read(self.state), noise, strict=True)]
         if self._send_clock is not None and self.index % self.values["clock_every"] == 0:
             self._send_clock(encode_clock(stamp))
         self._send_measurement[0](self._displacement.encode(stamp, values[:4]))
         self._send_measurement[1](self._pressures[0].encode(stamp, values[4]))
         self._send_measurement[2](self._pressures[1].encode(stamp, values[5]))
         if self.index % self.values["truth_every"] == 0:
-            self._publish_truth(
-                self._truth.encode(stamp, truth(self.car, self.state, self.command, self.road[1]).tolist())
-            )
+            known = self.stepped.truth(self.state, self.command, self.road[1])
+            self._publish_truth(self._truth.encode(stamp, known.tolist()))
         if self.values["report_progress"] and time.monotonic() > self._next_progress:
             self._next_progress = time.monotonic() + PROGRESS_PERIOD
             print(f"PROGRESS {self.index * self.period_ns / SECOND:.3f}", flush=True)

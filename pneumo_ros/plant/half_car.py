@@ -26,7 +26,7 @@ from pneumo_ros.plant.air_spring import (
     pressure_rate,
 )
 from pneumo_ros.plant.orifice import critical_ratio, flow_function
-from pneumo_ros.rig import Rig
+from pneumo_ros.rig import LIMITS, Rig
 from pneumo_ros.units import GRAVITY, INCH
 
 BUMP_STOP_HEIGHT = 1.2 * INCH  # m, below it the stop pushes; not in the thesis: keeps every run bounded
@@ -324,7 +324,7 @@ def half_car(
     surface : effective area surface; the 2M2A's by default
     step : longest RK4 step, s
     """
-    v = {name: getattr(rig, name).value for name in rig.__dataclass_fields__ if name != "name"}
+    v = {name: getattr(rig, name).value for name in LIMITS}
     body = Body(
         sprung_mass=v["sprung_mass"],
         pitch_inertia=v["pitch_inertia"],

@@ -107,7 +107,10 @@ def _settings(first: Log, second: Log) -> Iterator[Difference]:
 
 def _rig(log: Log) -> dict[str, Any]:
     rig = log.config if CONFIG_TOPIC in log.topics else None
-    return {k: v["value"] if isinstance(v, dict) else v for k, v in rig.to_dict().items()} if rig else {}
+    if rig is None:
+        return {}
+    beyond = {"effects": "; ".join(rig.findings)} if rig.diagnosed else {}
+    return {**{k: v["value"] if isinstance(v, dict) else v for k, v in rig.to_dict().items()}, **beyond}
 
 
 def _differences(where: str, first: dict[str, Any], second: dict[str, Any]) -> Iterator[Difference]:

@@ -115,6 +115,7 @@ class Report:
     missing_topics: tuple[str, ...]
     rig: str | None
     changed_parameters: dict[str, tuple[float, float]]
+    found_in_rig: tuple[str, ...]
     metadata: tuple[tuple[str, dict[str, str]], ...]
     setups: tuple[Setup, ...]
     calibrations: tuple[tuple[int, str], ...]
@@ -156,6 +157,7 @@ def inspect_log(log: Log) -> Report:
         missing_topics=tuple(t.name for t in CONTRACT_TOPICS if t.name not in log.topics),
         rig=rig.name if rig else None,
         changed_parameters=_changed(log),
+        found_in_rig=log.config.findings if log.config is not None else (),
         metadata=tuple((m.name, dict(m.metadata)) for m in log.metadata),
         setups=tuple(read_setups(log)),
         calibrations=tuple(read_calibrations(log)),

@@ -110,13 +110,14 @@ class Plan:
     changes: list[tuple[int, dict[str, Value]]] = field(default_factory=list)
 
 
-def replay(log: Log, overrides: Overrides | None = None) -> Replayed:
+def replay(log: Log, overrides: Overrides | None = None, rig: Rig | None = None) -> Replayed:
     """Step a log's measurements through estimator and controller.
 
     Parameters
     ----------
     log : with /rig/displacement and both pressures
     overrides : node -> parameter -> value, over the recorded parameters for the whole session
+    rig : that estimator and controller believe, in place of the log's
 
     Raises
     ------
@@ -126,7 +127,7 @@ def replay(log: Log, overrides: Overrides | None = None) -> Replayed:
     given = {node: dict(values) for node, values in (overrides or {}).items()}
     notes: list[str] = []
     setups = list(read_setups(log))
-    rig, period = log.config or load_rig(), control_period(log, setups, notes)
+    rig, period = rig or log.config or load_rig(), control_period(log, setups, notes)
     plans = {node: plan(setups, node, given.get(node, {}), notes) for node in TABLES}
     measured = measurements(log)
     recorded = {t.name: track(log, t) for t in (topics.ESTIMATE, topics.COMMAND, topics.SLIDING) if has(log, t)}
@@ -272,6 +273,7 @@ def _run(
         sample = given.values[i]
         if state is None or not continues(stamp, last, period_ns):
             state = stage.first(sample)
+        state = stage.placed(state, round((stamp - int(given.stamp_ns[0])) / period_ns))
         after, output = stage.step(state, sample)
         if waiting and stamp >= waiting[0][0] - CHANGE_WINDOW_NS:
             said = recorded.get(stamp) if recorded is not None else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,19 +14,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.control.half_car import build_controller
+from pneumo_ros.control.half_car import PROFILE, build_controller
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import build_estimator
+from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
-from pneumo_ros.rig import load_rig
+from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.session import topics
 from pneumo_ros.session.inspection import read_setups, seed_of
 from pneumo_ros.session.reading import Log
 from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
+from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage
 
 CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
 UNITS = ("m", "m", "m", "m", "Pa", "Pa")
+Build = Callable[[Rig, float], SteppedRig]  # a rig and its period, s
 
 
 @dataclass(frozen=True)
@@ -49,13 +53,15 @@ class Rerun:
     notes: tuple[str, ...]
 
 
-def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
-    """Run the recorded road through the log's rig, from rest.
+def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, build: Build | None = None) -> Rerun:
+    """Run the recorded road through a rig, from rest.
 
     Parameters
     ----------
     log : with /road/profile and the measurements
     overrides : node -> parameter -> value, over the recorded parameters
+    rig : in place of the log's
+    build : makes the rig to step, for one with effects; without it the nominal equations run
 
     Raises
     ------
@@ -66,29 +72,63 @@ def rerun(log: Log, overrides: Overrides | None = None) -> Rerun:
         raise InputError("no road in the log", where=log.path, key=topics.ROAD.name, remedy="record /road/profile")
     notes: list[str] = []
     setups = list(read_setups(log))
-    rig, period = log.config or load_rig(), control_period(log, setups, notes)
+    rig, period = rig or log.config or load_rig(), control_period(log, setups, notes)
     given = overrides or {}
     values = {node: plan(setups, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
-    car, _ = nominal_half_car(rig)
     measured = measurements(log)
     start = int(measured.stamp_ns[0])
     road = _road(log, start, int(measured.stamp_ns[-1]), period)
     seed = int(seed_of(log).get("plant", 0))
-    estimator = build_estimator(rig, period, values["estimator"])
-    controller = build_controller(rig, period, values["controller"])
-    run = close_loop(car, rig, estimator, controller, road, seed=seed)
+    if values["controller"]["controller"] == PROFILE:
+        build = build or plain_rig
+    if build is not None:
+        stages = EstimatorStage(rig, period, values["estimator"]), ControllerStage(rig, period, values["controller"])
+        noise = np.random.default_rng(seed).standard_normal((len(road) - 1, len(CHANNELS)))
+        noise *= [rig.displacement_noise.value] * 4 + [rig.pressure_noise.value] * 2
+        channels, commands = close_stepped(build(rig, period), stages, road, noise)
+        notes += [f"the rig as diagnosed: {', '.join(one.label for one in rig.effects) or 'no effect'}"] * rig.diagnosed
+    else:
+        estimator = build_estimator(rig, period, values["estimator"])
+        controller = build_controller(rig, period, values["controller"])
+        run = close_loop(nominal_half_car(rig)[0], rig, estimator, controller, road, seed=seed)
+        channels, commands = run.measurements, run.commands
     notes.append("the run starts from rest at the trim, whatever the rig was doing when the log began")
     notes.append(
         "sensor noise steers the valves: with other noise than the session's, motions differ in detail, not size"
     )
     return Rerun(
-        run.times[:-1],
-        run.measurements,
-        run.commands,
+        np.arange(len(channels), dtype=np.float64) * period,
+        channels,
+        commands,
         (measured.stamp_ns - start) * 1e-9,
         measured.values,
         tuple(notes),
     )
+
+
+def close_stepped(
+    rig: SteppedRig, stages: tuple[Stage, Stage], road: NDArray[np.float64], noise: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Channels (N, 6) and commands (N, 4) of a rig in closed loop, period by period.
+
+    Parameters
+    ----------
+    stages : estimator and controller
+    road : (N, 2) or (N + 1, 2) heights at the control periods, m
+    noise : (N, 6) of the sensors
+    """
+    estimator, controller = stages
+    channels, commands = np.empty_like(noise), np.empty((len(noise), 4))
+    state, seen, commanded = rig.init(), None, None
+    for i, row in enumerate(noise):
+        channels[i] = np.asarray(rig.read(state)) + row
+        seen, estimate = estimator.step(estimator.first(channels[i]) if seen is None else seen, channels[i])
+        before = controller.first(estimate.values) if commanded is None else commanded
+        commanded, command = controller.step(before, estimate.values)
+        commands[i] = command.values
+        if i + 1 < len(road):
+            state = rig.step(state, commands[i], road[i : i + 2])
+    return channels, commands
 
 
 def _road(log: Log, begin_ns: int, end_ns: int, period: float) -> NDArray[np.float64]:

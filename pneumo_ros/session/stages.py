@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
-from pneumo_ros.control.half_car import build_controller
+from pneumo_ros.control.profile import ProfilePlayer, build_commander
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.parameters import Value
@@ -35,6 +35,9 @@ class Stage(Protocol):
 
     def first(self, given: Array) -> Any:
         """State before the first input."""
+
+    def placed(self, state: Any, number: int) -> Any:
+        """The state at the ``number``-th sample of the session, for a stage that counts them."""
 
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
         """New state and output."""
@@ -59,6 +62,10 @@ class EstimatorStage:
         """At rest at the first measurement."""
         return self._estimator.init(given)
 
+    def placed(self, state: Any, number: int) -> Any:
+        """Does not count."""
+        return state
+
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
         """One measurement."""
         state, estimate = self._estimator.step(state, given)
@@ -69,11 +76,16 @@ class ControllerStage:
     """Estimate (16,) to command (4,), m2, and telemetry (6,) of /controller/sliding."""
 
     def __init__(self, rig: Rig, period: float, values: Mapping[str, Value]) -> None:
-        self._controller = build_controller(rig, period, known(CONTROL_PARAMETERS, values), "controller")
+        self._controller = build_commander(rig, period, known(CONTROL_PARAMETERS, values), "controller")
 
     def first(self, given: Array) -> Any:
         """The reference starts where the estimate is."""
         return self._controller.init(given)
+
+    def placed(self, state: Any, number: int) -> Any:
+        """A valve profile is looked up by it; a controller does not count."""
+        player = self._controller
+        return player.placed(state, number) if isinstance(player, ProfilePlayer) else state
 
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
         """One estimate; a command that is not finite is replaced by the trim, as in the node."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pneumo_ros.rig import LIMITS
 from pneumo_ros.road import iso_psd
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.ensemble import run_all
@@ -80,9 +81,9 @@ def _share_table(settings: ThesisSettings) -> Table:
 def perturbations() -> dict[str, dict[str, float]]:
     """The rig with one parameter off by three of its tolerances, either way."""
     rig, out = nominal()[0], {}
-    for name in rig.__dataclass_fields__:
+    for name in LIMITS:
         quantity = getattr(rig, name)
-        if name != "name" and quantity.std > 0.0 and not name.startswith("outlet"):  # outlets are commanded
+        if quantity.std > 0.0 and not name.startswith("outlet"):  # outlets are commanded
             for sign in (-1.0, 1.0):
                 out[f"{name} {sign * SIGMAS:+g} std"] = {name: quantity.value + sign * SIGMAS * quantity.std}
     return out

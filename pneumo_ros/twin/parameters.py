@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT, BUMP_STOP_STIFFNESS
-from pneumo_ros.rig import Rig
+from pneumo_ros.rig import LIMITS, Rig
 
 
 class End(NamedTuple):
@@ -141,7 +141,7 @@ def twin_of(rig: Rig, reference_pressures: tuple[float, float]) -> TwinRig:
     rig : nominal (or perturbed) parameters
     reference_pressures : static pressures of the nominal rig at design height, front and rear, Pa absolute
     """
-    value = {name: getattr(rig, name).value for name in rig.__dataclass_fields__ if name != "name"}
+    value = {name: getattr(rig, name).value for name in LIMITS}
     frame = Frame(
         sprung_mass=value["sprung_mass"],
         pitch_inertia=value["pitch_inertia"],

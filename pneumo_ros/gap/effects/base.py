@@ -7,13 +7,16 @@ the entry point group ``pneumo_ros.effects``. Four kinds of hook:
 - ``inputs``: changes command or road on their way to the plant (outside the kernel),
 - ``term``: adds force or flow inside the compiled kernel, with own states where needed,
 - ``outputs``: changes what a sensor reports.
+
+``inputs`` and ``outputs`` work on a block of rows and carry a memory from block to block (None before the first row),
+so that a whole log and a rig that is stepped row by row go through the same lines; :func:`by_column` does the carrying.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +28,7 @@ from pneumo_ros.plant.half_car import Body
 
 Array = NDArray[np.float64]
 Values = tuple[float, ...]
+Memory = Any  # what an effect keeps from one block of rows to the next; None before the first
 
 ENDS = ("front", "rear", "both")
 RIG = ("",)
@@ -48,8 +52,9 @@ class Plant(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What drives the plant: commands (N, 4) m2, each row held over a period; road (N + 1, 2) m, linear between
-    rows.
+    """What drives the plant: commands (N, 4) m2, each row held over a period; road (M, 2) m, linear between rows.
+
+    A whole record has one row of road more than of commands; further blocks have as many of one as of the other.
     """
 
     commands: Array
@@ -88,10 +93,22 @@ class Effect:
     places: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
     plant: Callable[[Plant, Ends, Values], Plant] | None = None
-    inputs: Callable[[Inputs, float, Ends, Values], Inputs] | None = None
-    outputs: Callable[[Array, float, tuple[int, ...], Values], Array] | None = None
+    inputs: Callable[[Inputs, float, Ends, Values, Memory], tuple[Inputs, Memory]] | None = None
+    outputs: Callable[[Array, float, tuple[int, ...], Values, Memory], tuple[Array, Memory]] | None = None
     undo: Callable[[Array, tuple[int, ...], Values], Array] | None = None
     term: PlantTerm | None = None
+
+
+def by_column(
+    change: Callable[[Array, Memory], tuple[Array, Memory]], table: Array, columns: Sequence[int], memory: Memory
+) -> tuple[Array, Memory]:
+    """Some columns of a block changed, each with its own memory; an empty block leaves everything as it is."""
+    if not len(table):
+        return table, memory
+    out, kept = table.copy(), dict(memory or {})
+    for column in columns:
+        out[:, column], kept[column] = change(table[:, column], kept.get(column))
+    return out, kept
 
 
 def ends_of(site: str) -> Ends:

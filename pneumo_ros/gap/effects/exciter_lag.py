@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.gap.effects.filters import lagged_line
 from pneumo_ros.gap.model import EffectParameter
 
 
-def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
     """Road heights that really act."""
-    road = inputs.road.copy()
-    for end in ends.columns:
-        road[:, end] = lagged_line(road[:, end], period, values[0], values[1])
-    return inputs._replace(road=road)
+    road, memory = by_column(
+        lambda u, kept: lagged_line(u, period, values[0], values[1], kept), inputs.road, ends.columns, memory
+    )
+    return inputs._replace(road=road), memory
 
 
 EFFECT = Effect(

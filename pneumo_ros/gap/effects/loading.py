@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
+import inspect
 import pkgutil
 import sys
 from collections.abc import Iterable, Sequence
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
     from pneumo_ros.gap.effects.base import Effect
 
 ENTRY_POINT_GROUP = "pneumo_ros.effects"
+HOOKS = {
+    "inputs": "inputs, period, ends, values, memory",
+    "outputs": "outputs, period, channels, values, memory",
+}
 NOT_EFFECTS = {"base", "filters", "loading"}
 
 
@@ -84,4 +89,8 @@ def _effect_in(path: Path) -> Effect:
         raise InputError(f"cannot load the effect ({error})", where=path, remedy=remedy) from error
     if not isinstance(effect, Effect):
         raise InputError("defines no EFFECT", where=path, remedy=remedy)
+    for hook, wanted in HOOKS.items():
+        function = getattr(effect, hook)
+        if function is not None and len(inspect.signature(function).parameters) != wanted.count(",") + 1:
+            raise InputError("hook of another form", where=path, key=hook, allowed=f"{hook}({wanted})", remedy=remedy)
     return effect

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Values
+from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Memory, Values, by_column
 from pneumo_ros.gap.effects.filters import first_order_line
 from pneumo_ros.gap.model import EffectParameter
 
 
-def outputs(outputs: Array, period: float, channels: tuple[int, ...], values: Values) -> Array:
+def outputs(
+    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+) -> tuple[Array, Memory]:
     """What the sensor reports."""
-    for channel in channels:
-        outputs[:, channel] = first_order_line(outputs[:, channel], period, values[0])
-    return outputs
+    return by_column(lambda u, kept: first_order_line(u, period, values[0], kept), outputs, channels, memory)
 
 
 EFFECT = Effect(

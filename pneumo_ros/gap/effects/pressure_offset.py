@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Values
+from pneumo_ros.gap.effects.base import PRESSURES_OR_BOTH, Array, Effect, Memory, Values
 from pneumo_ros.gap.model import EffectParameter
 
 
-def outputs(outputs: Array, period: float, channels: tuple[int, ...], values: Values) -> Array:
+def outputs(
+    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+) -> tuple[Array, Memory]:
     """What the sensor reports."""
     outputs[:, channels] += values[0]
-    return outputs
+    return outputs, None
 
 
 def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:

@@ -6,27 +6,29 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.gap.model import EffectParameter
 
 
 @njit(cache=True)
-def _played(u: NDArray[np.float64], half: float) -> NDArray[np.float64]:
-    """Backlash of half width ``half``: the follower moves only when pushed."""
+def _played(u: NDArray[np.float64], half: float, held: float) -> NDArray[np.float64]:
+    """Backlash of half width ``half``: the follower, at ``held`` before, moves only when pushed."""
     y = np.empty_like(u)
-    held = u[0]
     for i in range(u.shape[0]):
         held = min(max(held, u[i] - half), u[i] + half)
         y[i] = held
     return y
 
 
-def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
     """Inlets of the given ends: sticking, then overlap."""
-    commands = inputs.commands.copy()
-    for end in ends.columns:
-        commands[:, end] = np.maximum(_played(commands[:, end], values[1]) - values[0], 0.0)
-    return inputs._replace(commands=commands)
+
+    def opened(u: NDArray[np.float64], held: Memory) -> tuple[NDArray[np.float64], Memory]:
+        moved = _played(np.ascontiguousarray(u), values[1], u[0] if held is None else held)
+        return np.maximum(moved - values[0], 0.0), float(moved[-1])
+
+    commands, memory = by_column(opened, inputs.commands, ends.columns, memory)
+    return inputs._replace(commands=commands), memory
 
 
 EFFECT = Effect(

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Values
+from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.gap.effects.filters import lagged_hold
 from pneumo_ros.gap.model import EffectParameter
 
 
-def inputs(inputs: Inputs, period: float, ends: Ends, values: Values) -> Inputs:
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
     """Mean opening over each period, inlets and outlets of the given ends."""
-    commands = inputs.commands.copy()
-    for end in ends.columns:
-        for column in (end, 2 + end):
-            commands[:, column] = lagged_hold(commands[:, column], period, values[0], values[1])
-    return inputs._replace(commands=commands)
+    columns = [column for end in ends.columns for column in (end, 2 + end)]
+    commands, memory = by_column(
+        lambda u, kept: lagged_hold(u, period, values[0], values[1], kept), inputs.commands, columns, memory
+    )
+    return inputs._replace(commands=commands), memory
 
 
 EFFECT = Effect(

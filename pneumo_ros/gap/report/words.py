@@ -63,8 +63,8 @@ def next_steps(summary: Mapping[str, Any], logs: Sequence[str] = ("FIT.mcap",)) 
         return [_record_again(summary)]
     steps = []
     if experiment:
-        steps.append(f"Run {experiment['file']}, log it, and diagnose it together with {' and '.join(logs)}: "
-                     f"{str(experiment['description']).rstrip('.')}.")  # fmt: skip
+        steps.append(f"Run {experiment.get('command') or experiment['file']} and diagnose its log together with "
+                     f"{' and '.join(logs)}: {str(experiment['description']).rstrip('.')}.")  # fmt: skip
     elif float(summary["probability"]) < LIKELY:
         steps.append(
             f"Log a second session on another road and fit both: pneumo diagnose {' '.join(logs)} SECOND.mcap."
@@ -76,7 +76,7 @@ def next_steps(summary: Mapping[str, Any], logs: Sequence[str] = ("FIT.mcap",)) 
                      "file: --effect MY_EFFECT.py (docs/diagnosis.md shows one).")  # fmt: skip
     else:
         steps.append(f"Look at {_first_place(summary) or 'it'} on the rig, or keep the effect in the model: "
-                     "--save-rig RIG.yaml writes it.")  # fmt: skip
+                     "--save-rig RIG.yaml writes it for --rig of every verb.")  # fmt: skip
     return steps
 
 

@@ -28,7 +28,9 @@ def check_pair(fit: Sequence[Signals], holdout: Signals | None = None) -> None:
     for other in logs[1:]:
         different = _difference(logs[0].rig, other.rig)
         if different:
-            values = [getattr(log.rig, different).value for log in (logs[0], other)]
+            rigs = [log.rig for log in (logs[0], other)]
+            beyond = different == "effects"
+            values = [r.findings if beyond else getattr(r, different).value for r in rigs]
             raise InputError(
                 f"{logs[0].name} and {other.name} are of two rigs", key=different, value=values,
                 remedy="diagnose each rig from its own logs, or give --rig if the configs are known to be wrong",
@@ -52,7 +54,7 @@ def _difference(one: Rig, two: Rig) -> str | None:
         a, b = getattr(one, name).value, getattr(two, name).value
         if name not in NOT_THE_RIG and abs(a - b) > SAME * max(abs(a), abs(b)):
             return name
-    return None
+    return "effects" if (one.ends, one.effects) != (two.ends, two.effects) else None
 
 
 def _same_data(one: Signals, two: Signals) -> bool:

@@ -38,11 +38,11 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
     Parameters
     ----------
     log : the session's log
-    passive : the same road with valves at trim, if the caller has simulated it already
+    passive : the same road with valves at trim, if the caller has simulated it already; a rig with effects needs it
     """
     report = inspect_log(log)
     session = load_session(log.path)
-    if passive is None and len(session.truth) > 1 and len(session.road) > 1:
+    if passive is None and not session.rig.diagnosed and len(session.truth) > 1 and len(session.road) > 1:
         passive = passive_twin(session)
     ours = summarise(session, loop_timing(log.path), wall_time(log.path))
     theirs = summarise(passive) if passive is not None else None
@@ -61,7 +61,8 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "events": [_event_row(event, report) for event in report.events],
         "calibrations": [(f"{time_ns / 1e9:.3f}", text) for time_ns, text in report.calibrations],
         "setups": list(setup_rows(report.setups)),
-        "rig": [(name, f"{nominal:g}", f"{value:g}") for name, (nominal, value) in report.changed_parameters.items()],
+        "rig": [(name, f"{nominal:g}", f"{value:g}") for name, (nominal, value) in report.changed_parameters.items()]
+        + [("as diagnosed", "", text) for text in report.found_in_rig],
         "rig_name": report.rig or "not in the log",
         "metadata": [
             (n, k, _short(v)) for n, entries in report.metadata if n not in _HIDDEN for k, v in entries.items()

@@ -1,0 +1,15 @@
+"""The same road with the valves at trim, on the rig of the log with whatever a diagnosis found in it."""
+
+from __future__ import annotations
+
+from pneumo_ros.gap.stepped import stepped_rig
+from pneumo_ros.session.passive import passive_twin, road_period
+from pneumo_ros.session.summary import Recorded
+
+
+def passive_run(session: Recorded) -> Recorded | None:
+    """None where the log lacks truth or road."""
+    if len(session.truth) < 2 or len(session.road) < 2:
+        return None
+    rig = session.rig
+    return passive_twin(session, stepped_rig(rig, road_period(session)) if rig.diagnosed else None)
