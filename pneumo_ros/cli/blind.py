@@ -94,7 +94,7 @@ def score(
     found = load_results(results or folder / "diagnoses", answers)
     page = output or folder / "results.md"
     summary = write_report(page, answers, found, manifest)
-    Console().print(summary)
+    Console(soft_wrap=True, highlight=False).print(summary, markup=False)
     if wanted is not None:
         _hold_to(wanted, found)
 
