@@ -111,3 +111,9 @@ def test_an_output_that_cannot_be_written_is_said_before_the_work(tmp_path: Path
     ):
         done = CliRunner().invoke(app, ["nothing.mcap", *options])
         assert isinstance(done.exception, InputError) and "nothing.mcap" not in str(done.exception)
+
+
+def test_a_log_given_twice_is_refused(tmp_path: Path) -> None:
+    logs = [write_log(tmp_path / name, *simulated(4.0), [load_rig().to_yaml()]) for name in ("a.mcap", "b.mcap")]
+    with pytest.raises(InputError, match=r"a\.mcap, b\.mcap: the same log is given twice"):
+        prepared(logs)
