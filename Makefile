@@ -38,6 +38,20 @@ SPEED := kernel composed control_step reading replay lockstep
 bench: $(READY)  ## Every speed, side by side with its limit
 	for name in $(SPEED); do echo "== $$name"; $(BIN)/python bench/$$name.py || exit 1; done
 
+WORKERS ?= 2
+BLIND ?= build/blind
+
+blind: $(READY)  ## The full blind check, 240 sealed cases (hours); goes on where it was interrupted
+	$(BIN)/pneumo blind make $(BLIND) --set full --workers $(WORKERS)
+	$(BIN)/pneumo blind diagnose $(BLIND) --workers $(WORKERS)
+	$(BIN)/pneumo blind score $(BLIND) --output docs/blind-results.md
+
+blind-ci: $(READY)  ## Six blind cases, made and diagnosed anew, that must keep their verdicts (3 min)
+	rm -rf $(BLIND)-ci
+	$(BIN)/pneumo blind make $(BLIND)-ci --set ci --workers $(WORKERS)
+	$(BIN)/pneumo blind diagnose $(BLIND)-ci --workers $(WORKERS)
+	$(BIN)/pneumo blind score $(BLIND)-ci --expect test/data/blind-ci.json
+
 docs: $(READY)  ## Write the generated tables of docs/ anew
 	$(BIN)/python -m pneumo_ros.cli.reference
 

@@ -35,6 +35,7 @@ class Bench:
         road: Road = FLAT,
     ) -> None:
         self.now, self.rows = START, 0
+        self.zero = START  # when the device's clock began
         self.hello = hello or board_identity()
         lines = load_calibration(calibration)
         self.simulation = RigSimulation(
@@ -59,7 +60,7 @@ class Bench:
 
     @property
     def us(self) -> int:
-        return (self.now - START) // 1000 % 2**32
+        return (self.now - self.zero) // 1000 % 2**32
 
     def _write(self, counts: tuple[int, ...]) -> None:
         self.simulation.write_outputs(counts)

@@ -58,13 +58,37 @@ def test_score_writes_the_page_and_holds_verdicts(folder: Path) -> None:
     assert "| ci-leak | single | leak (front) | 20.0 | payload 0.90 |" in page
     assert "0.500 (1/2;" in page
     expect.write_text(json.dumps({**verdicts, "ci-leak": "leak"}))
-    assert RUNNER.invoke(app, ["score", str(folder), "--expect", str(expect)]).exit_code == 1
+    done = RUNNER.invoke(app, ["score", str(folder), "--expect", str(expect)])
+    assert done.exit_code == 1
+    assert "ci-leak: verdict must be leak, is now payload (0.90)" in done.output and "1 of 6" in done.output
+    (folder / "diagnoses" / "ci-pair.json").unlink()
+    expect.write_text(json.dumps(verdicts))
+    done = RUNNER.invoke(app, ["score", str(folder), "--expect", str(expect)])
+    assert done.exit_code == 1 and "ci-pair: verdict must be valve_lag+tyre_damping, was not diagnosed" in done.output
+
+
+def test_a_tampered_label_is_not_opened(folder: Path) -> None:
+    seal_set(folder, "ci", NAMES)
+    labels = folder / "labels.json"
+    labels.write_text(labels.read_text().replace('"leak"', '"payload"'))
+    done = RUNNER.invoke(app, ["score", str(folder)])
+    assert isinstance(done.exception, InputError) and "ci-leak" in str(done.exception)
+    assert "differs from the one that was sealed" in str(done.exception) and not (folder / "results.md").exists()
 
 
 def test_mistakes_are_said(tmp_path: Path) -> None:
+    other, foreign = tmp_path / "other", tmp_path / "foreign"
+    for path, content in ((other, {"set": "dev", "cases": []}), (foreign, {"cases": [{"name": "a"}]})):
+        path.mkdir()
+        (path / "manifest.json").write_text(json.dumps(content))
     for arguments, message in (
         (["diagnose", str(tmp_path)], "cannot read the manifest"),
         (["make", str(tmp_path), "--set", "nope"], "unknown set"),
+        (["make", str(tmp_path), "--set", "ci", "--only", "nope"], "no case has this"),
+        (["make", str(other), "--set", "ci"], "holds another set"),
+        (["diagnose", str(other), "--only", "nope"], "no case has this"),
+        (["diagnose", str(foreign)], "not a manifest of cases"),
+        (["score", str(other), "--expect", str(tmp_path / "nope.json")], "cannot read the expected verdicts"),
     ):
         done = RUNNER.invoke(app, arguments)
         assert isinstance(done.exception, InputError)

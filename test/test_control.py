@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pneumo_ros.comfort import mean_personal_rating, rms, tyre_load_variation
+from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import CONTROLLERS, PARAMETERS, Controller, build_controller, control_half_car
 from pneumo_ros.control.laws.common import Error, Gains, saturation
 from pneumo_ros.control.laws.family import LAWS, wanted_jerk
@@ -253,3 +254,16 @@ def test_packed_parameters_are_the_controllers(name: str) -> None:
         whole = control_half_car(state, estimate, controller.law, controller.front, controller.rear, controller.surface)
         for packed, direct in zip(controller.step(state, estimate), whole, strict=True):
             np.testing.assert_array_equal(packed, direct)
+
+
+def test_a_command_that_is_not_finite_never_leaves_and_spoils_no_state() -> None:
+    """An estimate with a NaN: the valves go to trim, and the next sound estimate is answered as if nothing had been."""
+    controller = build_controller(load_rig(), 0.002)
+    state, sound = controller.init(), np.full(16, 1e-3)
+    spoiled = sound.copy()
+    spoiled[0] = np.nan
+    refused = guarded_step(controller, state, spoiled)
+    assert refused.refused and refused.state is state
+    assert np.array_equal(refused.command, controller.at_rest.command)
+    after, never = guarded_step(controller, refused.state, sound), guarded_step(controller, state, sound)
+    assert not after.refused and np.array_equal(after.command, never.command)

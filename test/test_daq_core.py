@@ -142,6 +142,21 @@ def test_a_board_that_restarts_is_met_again_and_not_armed() -> None:
     assert bench.core.phase is Phase.RUNNING
 
 
+def test_a_board_that_counts_its_boots_wrongly_gets_a_new_clock() -> None:
+    """Unplugged, started again and the same boot id: its clock is behind, which is no wrap of 71 minutes."""
+    bench = Bench().armed()
+    bench.core.closed("unplugged", bench.now)
+    bench.now += 800 * MS
+    bench.zero = bench.now
+    bench.boot()
+    bench.core.opened(bench.now)
+    count = len(bench.measurements)
+    bench.refuses_to_move_until_armed()
+    assert bench.core.phase is Phase.RUNNING
+    fresh = bench.measurements[count:]
+    assert len(fresh) > 1000 and max(abs(m.stamp_ns - m.arrival_ns) for m in fresh) < MS
+
+
 def test_a_restart_whose_announcement_is_lost_is_noticed() -> None:
     bench = Bench().armed()
     bench.to_host.clear()

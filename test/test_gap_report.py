@@ -16,9 +16,10 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import Diagnosis, Estimate, Gap, Ranked
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.report import Findings, render, write_outputs, write_report, write_residual_log
-from pneumo_ros.gap.report.contents import headline, place_words, readable, rounded
+from pneumo_ros.gap.report.contents import readable, rounded
 from pneumo_ros.gap.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.gap.report.rig_map import colour, draw_map
+from pneumo_ros.gap.report.words import confidence, headline, next_steps, place_words
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED
 from pneumo_ros.rig import load_rig
@@ -44,8 +45,9 @@ def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
         "ranking": [best, {**best, "effects": ["supply_droop"], "sites": [""], "side": None, "probability": 0.0,
                            "notes": ["droop ended at its bound"]}],
         "ambiguity_group": ["orifice_coefficient"], "not_testable": {"bump_stop": "the spring never came near it"},
-        "next_experiment": {"name": "x", "description": "Open both inlets fully.", "separation": 31.0,
-                            "separation_now": 1.2, "command": "pneumo run --road a.csv --valves b.csv"},
+        "next_experiment": {"name": "x", "file": "next_experiment_road.csv", "description": "Open both inlets fully.",
+                            "separation": 31.0, "separation_now": 1.2,
+                            "command": "pneumo run --road a.csv --valves b.csv"},
         "edit_test": {"log": "heavier.mcap", "changes": {"sprung_mass": 1.1}, "gap_nominal": 1.3, "gap_refit": 0.5,
                       "gap_best": 0.02},
         "gap": {"nominal": 1.2, "refit": 0.4, "best": 0.01, "noise_floor": 0.0034,
@@ -96,7 +98,7 @@ def test_the_page_says_verdict_place_size_and_shrink() -> None:
     assert "Open both inlets fully. It would drive the rivals 31 times the noise apart" in page
     assert "<code>pneumo run --road a.csv --valves b.csv</code>" in page
     assert "droop ended at its bound" in page and "not testable here: the spring never came near it" in page
-    assert "heavier.mcap (sprung mass x 1.1): gap 1.3 nominal, 0.5 re-estimated, 0.02" in page
+    assert "heavier.mcap (sprung mass +10.0 %): gap 1.3 nominal, 0.5 re-estimated, 0.02" in page
     assert "held&lt;out&gt;.mcap" in page and "held<out>" not in page
 
 
@@ -125,6 +127,34 @@ def test_a_pair_is_named_with_both_effects() -> None:
     summary["ranking"] = [{**summary["ranking"][0], "effects": ["leak", "valve_lag"], "sites": ["front", "both"]}]
     words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve"})
     assert words == "At the front, a leak; and at both ends, a slow valve."
+
+
+def test_every_verdict_says_what_to_do_next() -> None:
+    found = findings()
+    first, second = next_steps(found.summary, ["a.mcap"])
+    assert "pneumo run --road a.csv" in first and "a.mcap" in first
+    assert "the front air and valve" in second and "--save-rig" in second and second in render(found)
+    clear = {**found.summary, "next_experiment": None}
+    assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 1, 1]
+    assert "--effect" in next_steps({**clear, "verdict": "unknown"})[0]
+    assert "SECOND.mcap" in next_steps({**clear, "probability": 0.4})[0]
+
+
+def test_without_a_verdict_nothing_looks_like_one() -> None:
+    """The same numbers, but the log forbids a verdict: neither place nor candidate nor size is shown."""
+    summary = {**findings().summary, "verdict": "not_testable", "probability": 0.0,
+               "notes": ["a.mcap: Only these channels are usable: front_pressure; no verdict."]}  # fmt: skip
+    page = render(replace(findings(), summary=summary))
+    assert headline(summary, {}) == "No verdict. a.mcap: Only these channels are usable: front_pressure."
+    assert confidence(summary) == "no verdict" and "record the session again" in page
+    assert "What competed" not in page and "leak" not in page and colour(0.93) not in page
+
+
+def test_the_verdict_itself_is_no_rival_of_its_own() -> None:
+    alone = {**findings().summary, "ambiguity_group": ["leak"], "next_experiment": None}
+    assert "cannot tell apart" not in render(replace(findings(), summary=alone))
+    pair = {**alone, "ambiguity_group": ["leak", "leak+orifice_coefficient"]}
+    assert "leak+orifice_coefficient: the spring leaks and an orifice" in render(replace(findings(), summary=pair))
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -212,7 +242,7 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     found = Diagnosis("leak", 0.97, (("front_air", 0.98),), (ranked,), (), gap, {}, active, trajectories=runs)
     written = write_outputs(tmp_path / "new", found, model, [fit], holdout)
     assert [path.name for path in written] == ["diagnosis.json", "report.html", "residual.mcap"]
-    assert all(path.is_file() for path in written) and not list((tmp_path / "new").glob("*.part"))
+    assert sorted((tmp_path / "new").iterdir()) == sorted(written), "nothing else: no .part, no metadata.yaml"
     page = written[1].read_text()
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"

@@ -13,6 +13,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, check_pair, prepare, read_signals
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
+from pneumo_ros.units import ATMOSPHERE
 
 Topics = dict[str, TopicData]
 DISPLACEMENT, ROAD, VALVE = "/rig/displacement", "/road/profile", "/valve/command"
@@ -252,9 +253,12 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
     "nothing measured": (lambda t: {k: t[k] for k in (ROAD, VALVE)}, "nothing was measured"),
     "unknown names": (
         lambda t: {**t, ROAD: t[ROAD]._replace(channels={"left": t[ROAD].channels["front"]})},
-        "no usable 'front'",
+        "no 'front' in /road/profile",
     ),
-    "only NaN": (lambda t: {**t, ROAD: with_channel(t[ROAD], "rear", np.full(4000, np.nan))}, "no usable 'rear'"),
+    "only NaN": (
+        lambda t: {**t, ROAD: with_channel(t[ROAD], "rear", np.full(4000, np.nan))},
+        "'rear' of .* holds no number",
+    ),
     "millimetres": (
         lambda t: {**t, DISPLACEMENT: with_channel(t[DISPLACEMENT], "sprung_front", np.linspace(20.0, 40.0, 4000))},
         "not in metres",
@@ -267,13 +271,28 @@ REFUSED: dict[str, tuple[Spoil, str]] = {
         lambda t: {**t, VALVE: with_channel(t[VALVE], "front_inlet", t[VALVE].channels["front_inlet"] * 1e6)},
         "not in m2",
     ),
+    "road in millimetres": (
+        lambda t: {**t, ROAD: with_channel(t[ROAD], "front", t[ROAD].channels["front"] * 1e3)},
+        r"road height not in metres",
+    ),
+    "gauge pressures": (
+        lambda t: {
+            **t,
+            **{p: with_channel(t[p], "pressure", t[p].channels["pressure"] - ATMOSPHERE) for p in (FRONT, REAR)},
+        },
+        "gauge, not absolute",
+    ),
+    "one clock set ahead": (
+        lambda t: {**t, REAR: t[REAR]._replace(stamp=np.where(np.arange(4000) < 2000, 0.0, 0.1) + t[REAR].stamp)},
+        "share no time base, value '0.1 s'",
+    ),
     "too short": (lambda t: {k: rows(v, np.arange(500)) for k, v in t.items()}, "too short"),
     "too slow": (lambda t: {k: rows(v, np.arange(0, 4000, 40)) for k, v in t.items()}, "too slowly"),
     "stamps not set": (lambda t: {**t, ROAD: t[ROAD]._replace(stamp=np.zeros(4000))}, "stamps are not set"),
     "no overlap": (lambda t: {**t, ROAD: t[ROAD]._replace(stamp=t[ROAD].stamp + 100.0)}, "do not overlap"),
     "one clock set back": (
         lambda t: {**t, FRONT: t[FRONT]._replace(stamp=np.where(np.arange(4000) < 2000, 5.0, 0.0) + t[FRONT].stamp)},
-        "share no time base",
+        "set back in some topics",
     ),
 }
 
@@ -284,6 +303,31 @@ def test_what_cannot_be_diagnosed_is_refused_in_one_line(clean: Topics, case: st
     with pytest.raises(InputError, match=said) as error:
         prepare(spoil(clean), load_rig(), "bad.mcap")
     assert "\n" not in str(error.value)
+
+
+def test_a_recorder_that_stalls_is_no_jump_of_a_clock(clean: Topics) -> None:
+    late = {k: v._replace(received=v.stamp + np.where(v.stamp > 4.0, 0.4, 0.0)) for k, v in clean.items()}
+    assert codes(prepare(late, load_rig())) == codes(prepare(clean, load_rig()))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+def test_a_channel_that_mostly_stands_does_not_excuse_itself(clean: Topics, share: float) -> None:
+    values = clean[FRONT].channels["pressure"]
+    values = np.where(np.arange(4000) < share * 4000, np.median(values), values)
+    signals = prepare({**clean, FRONT: with_channel(clean[FRONT], "pressure", values)}, load_rig())
+    assert "frozen" in codes(signals) and signals.usable[4] == (share < 0.5)
+    assert signals.noise[4] == pytest.approx(PRESSURE_NOISE, rel=0.15)
+
+
+def test_a_missing_channel_says_what_is_there_instead(clean: Topics) -> None:
+    foreign = clean[DISPLACEMENT]._replace(
+        channels=dict(zip("abcd", clean[DISPLACEMENT].channels.values(), strict=True))
+    )
+    signals = prepare({**clean, DISPLACEMENT: foreign}, load_rig())
+    assert "which names a, b, c, d" in " ".join(limit.text for limit in signals.limitations)
+    empty = with_channel(clean[FRONT], "pressure", np.full(4000, np.nan))
+    texts = " ".join(limit.text for limit in prepare({**clean, FRONT: empty}, load_rig()).limitations)
+    assert "holds no number in /rig/front/pressure" in texts and "bridged" not in texts
 
 
 def test_two_rigs_are_refused(clean: Topics) -> None:

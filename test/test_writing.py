@@ -92,6 +92,20 @@ def test_log_times_sequence_and_bag_metadata(tmp_path: Path) -> None:
     assert sorted(times) == [("/note", 10**9 + 4), *((topics.ROAD.name, 10**9 + i) for i in range(5))]
 
 
+def test_a_log_among_others_leaves_the_folder_alone(tmp_path: Path) -> None:
+    """A folder's metadata.yaml is about one bag: a second log neither takes it over nor makes one where it must not."""
+    for name, folder in (("run.mcap", True), ("rerun.mcap", True), ("residual.mcap", False)):
+        writer = LogWriter(tmp_path / name, bag_folder=folder)
+        writer.write(writer.add_topic(topics.ROAD.name, topics.ROAD.type), sample(10**9))
+        writer.finish()
+        with AnyReader([tmp_path / name]) as lone:
+            assert lone.message_count == 1
+    assert (tmp_path / "metadata.yaml").read_text().count("path: run.mcap") == 1
+    lonely = tmp_path / "lonely"
+    LogWriter(lonely / "residual.mcap", bag_folder=False).finish()
+    assert [path.name for path in lonely.iterdir()] == ["residual.mcap"]
+
+
 def test_full_disk_ends_the_log_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The disk cannot be filled in a test: its usage is what the system would report."""
     usage = shutil.disk_usage(tmp_path)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,6 +13,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from pneumo_ros.twin.scoring.results import Found
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
@@ -41,6 +44,9 @@ def make(
     from pneumo_ros.twin.plan import plan
 
     cases = [case for case in plan(set_name) if only in case.name][: first or None]
+    if not cases:
+        raise InputError("no case has this in its name", key="--only", value=only, remedy="leave it away to make all")
+    _refuse_other_set(folder, set_name)
     items = [(case, str(folder)) for case in cases]
     _run("making", make_case, items, [case.name for case in cases], workers, scheduler)
     seal_set(folder, set_name, [case.name for case in cases])
@@ -49,7 +55,7 @@ def make(
 @app.command()
 def diagnose(
     folder: Folder,
-    output: Annotated[Path, typer.Option(help="Folder for the diagnoses; default FOLDER/diagnoses.")] = Path(),
+    output: Annotated[Path | None, typer.Option(help="Folder for the diagnoses; default FOLDER/diagnoses.")] = None,
     workers: Workers = 1,
     scheduler: Scheduler = "",
     only: Only = "",
@@ -57,8 +63,11 @@ def diagnose(
     """Run the diagnosis on every case of a set; it sees the logs and which effects to do without, nothing else."""
     from pneumo_ros.cli.blind_work import diagnose_case
 
-    results = output if output != Path() else folder / "diagnoses"
+    results = output or folder / "diagnoses"
     entries = [entry for entry in read_manifest(folder)["cases"] if only in entry["name"]]
+    if not entries:
+        raise InputError("no case has this in its name", where=folder, key="--only", value=only,
+                         remedy="leave it away to diagnose all")  # fmt: skip
     items = [(entry["name"], tuple(entry["withhold"]), str(folder), str(results)) for entry in entries]
     _run("diagnosing", diagnose_case, items, [entry["name"] for entry in entries], workers, scheduler)
 
@@ -66,10 +75,12 @@ def diagnose(
 @app.command()
 def score(
     folder: Folder,
-    labels: Annotated[Path, typer.Option(help="The maker's labels; default FOLDER/labels.json.")] = Path(),
-    results: Annotated[Path, typer.Option(help="Folder of the diagnoses; default FOLDER/diagnoses.")] = Path(),
-    output: Annotated[Path, typer.Option(help="Markdown page to write; default FOLDER/results.md.")] = Path(),
-    expect: Annotated[Path, typer.Option(help="JSON of verdicts that must be kept; exit 1 if one changed.")] = Path(),
+    labels: Annotated[Path | None, typer.Option(help="The maker's labels; default FOLDER/labels.json.")] = None,
+    results: Annotated[Path | None, typer.Option(help="Folder of the diagnoses; default FOLDER/diagnoses.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Markdown page to write; default FOLDER/results.md.")] = None,
+    expect: Annotated[
+        Path | None, typer.Option(help="JSON {case: verdict} of what must be kept; exit 1 if one changed.")
+    ] = None,
 ) -> None:
     """Open the answers, check their seals, score the diagnosis and four baselines."""
     from pneumo_ros.twin.scoring.report import write_report
@@ -78,23 +89,43 @@ def score(
 
     manifest = read_manifest(folder)
     digests = {entry["name"]: entry["label_sha256"] for entry in manifest["cases"]}
-    answers = opened(labels if labels != Path() else folder / "labels.json", digests)
-    found = load_results(results if results != Path() else folder / "diagnoses", answers)
-    page = output if output != Path() else folder / "results.md"
+    wanted = None if expect is None else _expected(expect)
+    answers = opened(labels or folder / "labels.json", digests)
+    found = load_results(results or folder / "diagnoses", answers)
+    page = output or folder / "results.md"
     summary = write_report(page, answers, found, manifest)
-    Console().print(summary)
-    if expect != Path():
-        _hold_to(expect, found)
+    Console(soft_wrap=True, highlight=False).print(summary, markup=False)
+    if wanted is not None:
+        _hold_to(wanted, found)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """The public manifest of a set."""
+    """The public manifest of a set.
+
+    Raises
+    ------
+    InputError
+        if the folder holds none, or it is not one.
+    """
     path = folder / "manifest.json"
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read the manifest ({error})", where=path,
-                         remedy="make the set with `pneumo blind make`") from error  # fmt: skip
+        manifest = dict(json.loads(path.read_text(encoding="utf-8")))
+        for entry in manifest["cases"]:
+            entry["name"], entry["withhold"], entry["label_sha256"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else f"not a manifest of cases: {error}"
+        raise InputError(f"cannot read the manifest ({reason})", where=path,
+                         remedy="give the folder of `pneumo blind make`") from error  # fmt: skip
+    return manifest
+
+
+def _refuse_other_set(folder: Path, set_name: str) -> None:
+    if not (folder / "manifest.json").exists():
+        return
+    held = read_manifest(folder).get("set")
+    if held != set_name:
+        raise InputError("the folder holds another set", where=folder, key="--set", value=set_name, allowed=str(held),
+                         remedy="choose another folder")  # fmt: skip
 
 
 def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int, scheduler: str) -> None:
@@ -134,14 +165,27 @@ def seal_set(folder: Path, set_name: str, names: Sequence[str]) -> None:
         part.rename(folder / name)
 
 
-def _hold_to(expect: Path, found: dict[str, Any]) -> None:
-    wanted: dict[str, str] = json.loads(expect.read_text(encoding="utf-8"))
-    changed = {name: (verdict, found[name].verdict if name in found else "missing")
-               for name, verdict in wanted.items() if name not in found or found[name].verdict != verdict}  # fmt: skip
-    for name, (before, now) in changed.items():
-        Console(stderr=True).print(f"{name}: verdict was {before}, is now {now}")
+def _expected(path: Path) -> dict[str, str]:
+    try:
+        return {str(name): str(verdict) for name, verdict in dict(json.loads(path.read_text(encoding="utf-8"))).items()}
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"cannot read the expected verdicts ({error})", where=path, key="--expect",
+                         remedy='give a JSON file {"case": "verdict"}') from error  # fmt: skip
+
+
+def _hold_to(wanted: Mapping[str, str], found: Mapping[str, Found]) -> None:
+    """Exit with 1 and a line for each case whose verdict is not the wanted one."""
+    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    changed = 0
+    for name, verdict in wanted.items():
+        now = f"is now {found[name].verdict} ({found[name].probability:.2f})" if name in found else "was not diagnosed"
+        if name not in found or found[name].verdict != verdict:
+            console.print(f"[red]{name}[/red]: verdict must be {verdict}, {now}")
+            changed += 1
     if changed:
+        console.print(f"{changed} of {len(wanted)} verdicts changed")
         raise typer.Exit(1)
+    Console().print(f"all {len(wanted)} verdicts kept")
 
 
 def _bar() -> Progress:

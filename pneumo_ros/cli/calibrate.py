@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pneumo_ros.daq.calibration_fit import Fit
 
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 
 
 @app.command()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
     from pneumo_ros.road import Road
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 
 
 @app.command()
@@ -40,6 +40,7 @@ def emulate(
 ) -> None:  # fmt: skip
     """Emulate the rig on a pseudo-terminal: plant in real time, converters, valves, watchdog, and faults."""
     import signal
+    import time
 
     from rich.console import Console
 
@@ -57,7 +58,7 @@ def emulate(
         _show_faults(console)
         return
     the_rig = load_rig(rig)
-    hello = board_identity(adc_bits=adc_bits, dac_bits=dac_bits)
+    hello = board_identity(boot_id=round(time.time()) % 2**32, adc_bits=adc_bits, dac_bits=dac_bits)
     simulation = RigSimulation(
         the_rig, _road(road, speed, seed, the_rig.wheelbase), hello, load_calibration(calibration),
         SimulationSettings(seed, converter_noise), stepped_rig(the_rig, hello.sample_period_us * 1e-6),

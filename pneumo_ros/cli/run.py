@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pneumo_ros.rig import Rig
     from pneumo_ros.session.plan import Tables, Values
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 FAILED = 1
 CONTROLLER = "smflc"
 ALIASES = {CONTROLLER: "default"}

@@ -14,7 +14,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from pneumo_ros.thesis.report import Chapter
 
-app = typer.Typer()
+app = typer.Typer(add_completion=False)
 console = Console()
 
 

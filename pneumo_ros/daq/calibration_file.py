@@ -40,7 +40,13 @@ def find_calibration(name: str | Path | None) -> Path:
         if not path.is_file():
             raise InputError("no such calibration file", where=path, remedy="give a readable YAML file")
         return path
-    return share_file("config", "calibration", f"{path}.yaml")
+    folder = share_file("config", "calibration")
+    found = folder / f"{path}.yaml"
+    if not found.exists():
+        shipped = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
+        raise InputError("no such calibration", key="calibration", value=str(path), allowed=shipped,
+                         remedy="or give a YAML file")  # fmt: skip
+    return found
 
 
 def load_calibration(name: str | Path | None = None) -> Calibration:

@@ -30,6 +30,7 @@ class ClockSettings:
     drift_after_ns : no drift is estimated from less than this; a stall of 1 ms in 1 s would look like 1000 ppm
     drift_limit : largest believable drift; crystals stay within 1e-4, ceramic resonators within 5e-3
     correction_limit_ns : half a round trip above this is not believed to be symmetric
+    late_ns : longest that a frame is held up on its way, for telling a clock that runs on from one that began anew
     """
 
     bin_ns: int = SECOND // 10
@@ -37,6 +38,7 @@ class ClockSettings:
     drift_after_ns: int = 2 * SECOND
     drift_limit: float = 5e-3
     correction_limit_ns: int = 5_000_000
+    late_ns: int = 2 * SECOND
 
 
 class DeviceClock:
@@ -89,6 +91,14 @@ class DeviceClock:
         self._raw_us, self._device_ns, self._arrival_ns = device_us, device, arrival_ns
         self._note(device, arrival_ns - device)
         return device
+
+    def runs_on(self, device_us: int, now_ns: int) -> bool:
+        """Whether a device time that was read about ``now_ns`` continues this clock, or the device has started anew.
+
+        A clock that was set to zero looks like a wrap: 71 minutes that have not passed here.
+        """
+        ahead = self._unwrapped(device_us, now_ns) - self._device_ns - (now_ns - self._arrival_ns)
+        return bool(self.samples) and abs(ahead) <= self.settings.late_ns
 
     def add_receipt(self, device_us: int, sent_ns: int) -> None:
         """The device got at ``device_us`` a command that the host had sent at ``sent_ns``."""

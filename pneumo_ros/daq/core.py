@@ -180,7 +180,7 @@ class DriverCore:
         if before is None or now - self._last_sample > CLOCK_KEPT:
             return None
         same = (hello.serial_number, hello.boot_id) == (before.hello.serial_number, before.hello.boot_id)
-        return before.clock if same else None
+        return before.clock if same and before.clock.runs_on(hello.device_us, now) else None
 
     def _say_doubts(self, hello: Hello, now: int) -> None:
         assert self.intake is not None

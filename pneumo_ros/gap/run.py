@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from pneumo_ros.errors import InputError
+from pneumo_ros.gap import effects as effect_files
 from pneumo_ros.gap.compete import Progress
 from pneumo_ros.gap.diagnose import Options, Whereabouts, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
+from pneumo_ros.gap.effects.base import Effect
 from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
@@ -59,7 +63,7 @@ def prepared(
     Raises
     ------
     InputError
-        for logs, rigs or effects that cannot be used.
+        for logs, rigs or effects that cannot be used, and for inputs that throw the nominal model off.
     """
     if not fit:
         raise InputError("no log to fit", remedy="give at least one log")
@@ -70,16 +74,47 @@ def prepared(
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
     logs = [first, *(read_signals(path, rig) for path in fit[1:])]
     model = RigModel(first.rig, library, frozenset(without))
-    notes = _standing_notes(model)
+    notes = [*_outside(library), *_standing_notes(model)]
     if holdout is None:
         check_pair(logs, None)
         logs, held = split_by_time(logs)
-        notes += ("no held-out log was given: the end of the last fit log is held out, which tests less",)
+        notes.append("no held-out log was given: the end of the last fit log is held out, which tests less")
     else:
         held = read_signals(holdout, rig)
         check_pair(logs, held)
+    _check_runs(model, [*logs, held])
     changed = None if edit is None else read_signals(edit)
-    return Task(model, tuple(logs), held, changed, notes)
+    if changed is not None:
+        notes += _about_edit(model, changed)
+    return Task(model, tuple(logs), held, changed, tuple(notes))
+
+
+def _outside(library: Mapping[str, Effect]) -> list[str]:
+    """Which effects of the library are not the package's own: a reader must know who competed."""
+    folder = Path(effect_files.__file__).parent
+    names = [name for name in library if not (folder / f"{name}.py").exists()]
+    return [f"effects of your own that competed: {', '.join(names)}"] if names else []
+
+
+def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:
+    """Refuse inputs that throw the nominal model off the road: no fit starts from there."""
+    for log in logs:
+        if not np.all(np.isfinite(model.simulate(log))):
+            raise InputError(
+                "the nominal model runs away with this log's road and commands", where=log.name,
+                value=f"road up to {np.max(np.abs(log.road)):.3g} m, openings up to {np.max(log.commands):.3g} m2",
+                remedy="check the units of /road/profile and /valve/command, and the rig",
+            )  # fmt: skip
+
+
+def _about_edit(model: RigModel, edit: Signals) -> list[str]:
+    """What limits the edit test: the log itself, or a configuration that states no change."""
+    notes = [f"{edit.name}: {one.text}" for one in edit.limitations]
+    if all(factor == 1.0 for factor in model.changes(edit).values()):
+        notes.append(
+            f"{edit.name}: its configuration states no change of the rig, so the edit test is one more held-out log"
+        )
+    return notes
 
 
 def _standing_notes(model: RigModel) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Mapping
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
+from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.profile import Commander, ProfilePlayer, build_commander
 from pneumo_ros.daq.safety_config import load_safety
@@ -46,7 +46,6 @@ class ControllerNode(RigNode):
         # Load the compiled code now: the first period of a real-time session is as short as the others.
         self.controller.step(self.controller.init(), np.full(16, 1e-3))
         self.state: NDArray[np.float64] | None = None
-        self._safe = self.controller.at_rest.command
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
         self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
         self._publish = self.publisher(topics.COMMAND).publish
@@ -86,11 +85,9 @@ class ControllerNode(RigNode):
             self._first_stamp = self._first_stamp or stamp
             self.state = self.controller.placed(self.state, round((stamp - self._first_stamp) / self.period_ns))
         self._last_ns, self._last_stamp, self._stale = start, stamp, False
-        state, command, telemetry = self.controller.step(self.state, estimate)
-        if math.isfinite(command[0] + command[1] + command[2] + command[3]):
-            self.state = state
-        else:
-            command = self._refuse(stamp)
+        self.state, command, telemetry, refused = guarded_step(self.controller, self.state, estimate)
+        if refused:
+            self._say_refused(stamp)
         self._publish(self._command(stamp, command))
         if self._steps % self.values["telemetry_every"] == 0:
             shown = np.concatenate([telemetry, self.state[[0, 3]]])
@@ -108,12 +105,11 @@ class ControllerNode(RigNode):
             self.event(WARN, "estimate_stale", f"no estimate for {age / 1e6:.1f} ms: safe command")
         self._publish(self._command(self.get_clock().now().nanoseconds, self._closed))
 
-    def _refuse(self, stamp: int) -> NDArray[np.float64]:
+    def _say_refused(self, stamp: int) -> None:
         """Valves at trim instead of a command that is not finite; said once a second at most."""
         if self._refused % round(self.values["rate_hz"]) == 0:
             self.event(ERROR, "command_not_finite", "valves at trim instead", {"stamp_ns": str(stamp)})
         self._refused += 1
-        return self._safe
 
     def health(self) -> dict[str, str]:
         """Loop figures and refused commands."""

@@ -46,7 +46,8 @@ class RoadProfileNode(RigNode):
         if self._start is None:
             self._start = now
         index = round((now - self._start) / self.period_ns) + LEAD
-        for i in range(self._sent + 1, index + 1):
+        # A clock that jumps ahead leaves a hole in the road; filling it would flood the log.
+        for i in range(max(self._sent + 1, index - BLOCK), index + 1):
             self._send(i)
         self._sent = max(self._sent, index)
         self.timed(start)

@@ -27,7 +27,8 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
     axes[-1].set_xlabel("time (s)")
     for axis in axes:
         axis.grid(alpha=0.3)
-        axis.legend(loc="upper right", fontsize=8, ncols=3)
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.margins(x=0)
     figure.suptitle(title)
     part = path.with_name(path.name + ".part")

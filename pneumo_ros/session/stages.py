@@ -6,13 +6,13 @@ recorded bytes again only because of that, and a test holds the two together.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.profile import ProfilePlayer, build_commander
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
@@ -89,10 +89,8 @@ class ControllerStage:
 
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
         """One estimate; a command that is not finite is replaced by the trim, as in the node."""
-        new, command, telemetry = self._controller.step(state, given)
-        if not math.isfinite(command.sum()):
-            new, command = state, self._controller.at_rest.command
-        return new, Output(command, np.concatenate([telemetry, new[[0, 3]]]))
+        done = guarded_step(self._controller, state, given)
+        return done.state, Output(done.command, np.concatenate([done.telemetry, done.state[[0, 3]]]))
 
 
 def known(table: Any, values: Mapping[str, Value]) -> dict[str, Value]:

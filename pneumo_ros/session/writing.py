@@ -70,6 +70,8 @@ class LogWriter:
     path : final name of the file (.mcap)
     metadata : name -> (key -> text) records that explain the run (config, seeds, versions ...); written first, so that
         a log whose recorder was killed still explains itself
+    bag_folder : write rosbag2's metadata.yaml beside it, so that ``ros2 bag`` takes the folder of a session. The file
+        itself carries the same record, which is all that a lone .mcap needs: False where the folder is not the log's
 
     :meth:`write` only queues; a thread does the rest. :meth:`finish` must be called, also after an error.
 
@@ -79,8 +81,10 @@ class LogWriter:
         if the file exists or cannot be created.
     """
 
-    def __init__(self, path: Path, metadata: Mapping[str, Mapping[str, str]] | None = None) -> None:
-        self.path = path
+    def __init__(
+        self, path: Path, metadata: Mapping[str, Mapping[str, str]] | None = None, bag_folder: bool = True
+    ) -> None:
+        self.path, self.bag_folder = path, bag_folder
         self.part = path.with_name(path.name + ".part")
         _refuse_bad_target(path)
         self._channels: dict[str, Channel] = {}
@@ -162,7 +166,8 @@ class LogWriter:
         self._writer.finish()
         self._stream.close()
         self.part.rename(self.path)
-        _write_beside(self.path, text)
+        if self.bag_folder:
+            _write_beside(self.path, text)
         return result
 
     def _drain(self) -> None:
@@ -245,7 +250,7 @@ def _refuse_bad_target(path: Path) -> None:
 def _write_beside(path: Path, text: str) -> None:
     """metadata.yaml makes the folder a bag; one that describes another log is left alone."""
     target = path.with_name("metadata.yaml")
-    if target.exists() and path.name not in target.read_text(encoding="utf-8"):
+    if target.exists() and f"- {path.name}\n" not in target.read_text(encoding="utf-8"):
         return
     part = target.with_name("metadata.yaml.part")
     part.write_text(text, encoding="utf-8")

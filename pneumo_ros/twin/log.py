@@ -19,14 +19,12 @@ NANO = 1e9
 def write_log(path: Path, session: Session, config: Rig, start_ns: int) -> None:
     """Write ``path`` (.mcap); ``config`` is what /rig/config says, ``start_ns`` the stamp of the first sample."""
     messages = sorted(_messages(session, config, start_ns), key=lambda item: item[1])
-    writer = LogWriter(path)
+    writer = LogWriter(path, bag_folder=False)  # a case holds several logs, none of which is the folder's bag
     topics = {t.name: writer.add_topic(t.name, t.type)
               for t in (ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, CONFIG)}  # fmt: skip
     for name, stamp, data in messages:
         writer.write(topics[name], data, stamp)
     writer.finish()
-    beside = path.with_name("metadata.yaml")
-    beside.unlink(missing_ok=True)  # a case holds several logs, none of which is the folder's bag
 
 
 def _messages(session: Session, config: Rig, start_ns: int) -> list[tuple[str, int, bytes]]:

@@ -11,6 +11,17 @@ from numpy.typing import NDArray
 
 from pneumo_ros.gap.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.gap.report.rig_map import draw_map
+from pneumo_ros.gap.report.words import (
+    LIKELY,
+    confidence,
+    headline,
+    how_far,
+    next_steps,
+    percent,
+    place_words,
+    sentence,
+    winner,
+)
 from pneumo_ros.gap.signals import MEASURED, Signals
 from pneumo_ros.gap.where import Law
 
@@ -18,7 +29,6 @@ Array = NDArray[np.float64]
 
 ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
 SHOWN_CHANNELS = 2  # the rest is folded away
-SURE, LIKELY = 0.9, 0.6
 TITLES = {
     "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
     "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
@@ -57,7 +67,8 @@ class Findings:
 def contents(found: Findings) -> dict[str, Any]:
     """Variables of the template."""
     summary = found.summary
-    shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", [])}
+    told = summary["verdict"] != "not_testable"  # without a verdict no place, candidate or size may look like one
+    shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", []) if told}
     charts = _charts(found)
     return {
         "title": f"Gap of {found.holdout.rig.name}",
@@ -66,6 +77,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "confidence": confidence(summary),
         "tone": _tone(summary),
         "how_far": how_far(summary),
+        "next_steps": next_steps(summary, found.fit_names),
         "map": draw_map(shares),
         "places": [
             {"name": place, "words": place_words(place), "share": share}
@@ -76,16 +88,15 @@ def contents(found: Findings) -> dict[str, Any]:
         "ladder": ladder(_rungs(summary["gap"], found.mended)),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
-        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10]],
-        "parameters": _parameters(summary),
-        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items()],
-        "ambiguity": _ambiguity(summary, found.phrases),
+        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10] if told],
+        "parameters": _parameters(summary) if told else [],
+        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items() if told],
+        "ambiguity": _ambiguity(summary, found.phrases) if told else [],
         "experiment": summary.get("next_experiment"),
         "edit": _edit(summary),
         "refused": _refused(summary),
-        "notes": [_sentence(note) for note in summary.get("notes", [])],
-        "limitations": [limit.text for limit in found.holdout.limitations],
-        "regimes": [_sentence(text) for text in found.regimes],
+        "notes": [sentence(note) for note in summary.get("notes", [])],
+        "regimes": [sentence(text) for text in found.regimes],
         "conditional": [{"name": name.replace("_", " "), "gap": gap} for name, gap in found.conditional.items()],
         "topics": found.holdout.topics,
         "fit_names": list(found.fit_names),
@@ -93,85 +104,6 @@ def contents(found: Findings) -> dict[str, Any]:
         "rig": found.holdout.rig.name,
         "seconds": len(found.holdout.measured) * found.holdout.period,
     }
-
-
-def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
-    """The verdict as a sentence."""
-    verdict = str(summary["verdict"])
-    if verdict == "none":
-        return "No unmodelled effect: the rig's own tolerances explain the log."
-    if verdict == "not_testable":
-        return "This log cannot tell: it did not excite the rig enough to show an effect."
-    if verdict == "unknown":
-        location = summary.get("location") or [{"place": "an unclear place"}]
-        return f"Something that no listed effect explains, at {place_words(location[0]['place'])}."
-    entry = _winner(summary)
-    sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
-    parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
-    return _sentence("; and ".join(parts))
-
-
-def confidence(summary: Mapping[str, Any]) -> str:
-    """How sure, in words and in per cent."""
-    p = float(summary["probability"])
-    word = "sure" if p >= SURE else "likely" if p >= LIKELY else "not sure"
-    return f"{word}: {'above 99' if p > 0.99 else format(100 * p, '.0f')} %"
-
-
-def how_far(summary: Mapping[str, Any]) -> str:
-    """What adding the effect does to the held-out gap, in a sentence."""
-    gap = summary["gap"]
-    if summary["verdict"] in ("none", "unknown", "not_testable") or not summary.get("ranking"):
-        return (
-            f"On the held-out log the nominal model is off by {gap['nominal']:.3g} of the signals' own size; "
-            f"parameters re-estimated inside their tolerances leave {gap['refit']:.3g}; sensor noise alone would be "
-            f"{gap['noise_floor']:.2g}."
-        )
-    best = _winner(summary)
-    low, high = best["shrink_ci90"]
-    return (
-        f"Adding it shrinks the held-out gap from {gap['refit']:.3g} (parameters re-estimated inside their tolerances) "
-        f"to {gap['best']:.2g}, by {_percent(best['shrink'])} (90 % interval {_percent(low)} to {_percent(high)}); "
-        f"sensor noise alone would leave {gap['noise_floor']:.2g}."
-    )
-
-
-def place_words(place: str) -> str:
-    """A contract place in words."""
-    if place.startswith("sensor:"):
-        return f"the sensor {place.removeprefix('sensor:').replace('_', ' ')}"
-    words = {
-        "body_heave": "the body (up and down)", "body_pitch": "the body (pitch)", "road_input": "the road input",
-        "supply": "the air supply",
-    }  # fmt: skip
-    end, _, part = place.partition("_")
-    parts = {"air": "air and valve", "force": "spring force"}
-    return words.get(place, f"the {end} {parts.get(part, part)}")
-
-
-def _winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
-    wanted = set(str(summary["verdict"]).split("+"))
-    ranking: Sequence[Mapping[str, Any]] = summary.get("ranking", [])
-    return next((entry for entry in ranking if set(entry["effects"]) == wanted), ranking[0])
-
-
-def _effect_words(effect: str, side: str | None, phrases: Mapping[str, str]) -> str:
-    what = phrases.get(effect, effect.replace("_", " "))
-    where = {"both": "at both ends", "front": "at the front", "rear": "at the rear"}.get(side or "")
-    if where is None:
-        return f"{what} ({side.replace('_', ' ')})" if side else what
-    return f"{where}, {what}"
-
-
-def _sentence(text: str) -> str:
-    text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
-
-
-def _percent(share: float) -> str:
-    """Whole per cent, with a digit more where 99.6 would read as 100."""
-    value = 100.0 * share
-    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{value:.0f} %"
 
 
 def _tone(summary: Mapping[str, Any]) -> str:
@@ -245,7 +177,7 @@ def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str
         "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
         "probability": float(entry["probability"]),
         "gap": float(entry["gap_after"]),
-        "shrink": _percent(entry["shrink"]),
+        "shrink": percent(entry["shrink"]),
         "bar": shrink_bar(entry["shrink"], (low, high)),
     }
 
@@ -266,7 +198,7 @@ def _law(law: Law) -> dict[str, str]:
 def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     if not summary.get("ranking"):
         return []
-    return [_quantity(name, value) for name, value in _winner(summary)["parameters"].items()]
+    return [_quantity(name, value) for name, value in winner(summary)["parameters"].items()]
 
 
 def _quantity(name: str, quantity: Mapping[str, Any]) -> dict[str, str]:
@@ -306,16 +238,19 @@ def rounded(value: float, std: float) -> str:
 
 
 def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[str]:
-    return [
-        f"{effect}: {phrases[effect]}" if effect in phrases else effect for effect in summary.get("ambiguity_group", [])
-    ]
+    """Rivals of the verdict, itself left out; a pair ("a+b") in the words of its parts."""
+    rivals = [name for name in summary.get("ambiguity_group", []) if name != summary["verdict"]]
+    words = [" and ".join(phrases.get(part, "") for part in name.split("+")) for name in rivals]
+    return [f"{name}: {said}" if said else name for name, said in zip(rivals, words, strict=True)]
 
 
 def _edit(summary: Mapping[str, Any]) -> str:
     test = summary.get("edit_test")
     if not test:
         return ""
-    changes = ", ".join(f"{name.replace('_', ' ')} x {factor:.3g}" for name, factor in test["changes"].items())
+    changes = ", ".join(
+        f"{name.replace('_', ' ')} {100 * (factor - 1):+.1f} %" for name, factor in test["changes"].items()
+    )
     return (
         f"Predicted without refitting on {test['log']} ({changes or 'nothing changed'}): gap {test['gap_nominal']:.3g} "
         f"nominal, {test['gap_refit']:.3g} re-estimated, {test['gap_best']:.3g} with the best explanation."

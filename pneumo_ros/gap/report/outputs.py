@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,6 +27,23 @@ MAX_LAWS = 2
 FILES = ("diagnosis.json", "report.html", "residual.mcap")
 
 
+def claim_folder(folder: Path) -> None:
+    """Make the folder and see that it can be written, before the time of a diagnosis is spent.
+
+    Raises
+    ------
+    InputError
+        if it cannot.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"cannot write there ({reason})", where=folder, remedy="choose another folder") from error
+
+
 def write_outputs(
     folder: Path,
     diagnosis: Diagnosis,
@@ -35,6 +53,8 @@ def write_outputs(
     location: Location | None = None,
 ) -> list[Path]:
     """Write all files of a diagnosis of the half car; older ones of the same names are replaced.
+
+    diagnosis.json, which programs look for, comes last: where it is new, the others are.
 
     Parameters
     ----------
@@ -47,16 +67,11 @@ def write_outputs(
     InputError
         if the folder cannot be made or written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_json(diagnosis, folder / FILES[0])
-    except OSError as error:
-        raise InputError(
-            f"cannot write the diagnosis ({error})", where=folder, remedy="choose another folder"
-        ) from error
+    claim_folder(folder)
     where = location or locate(model, fit, holdout)
     write_report(folder / FILES[1], _findings(diagnosis, model, fit, holdout, where))
     write_residual_log(folder / FILES[2], holdout, diagnosis.trajectories)
+    write_json(diagnosis, folder / FILES[0])
     return [folder / name for name in FILES]
 
 

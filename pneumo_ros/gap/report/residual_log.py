@@ -48,9 +48,8 @@ def write_residual_log(path: Path, holdout: Signals, trajectories: Mapping[str, 
     path.unlink(missing_ok=True)
     stamps = round(holdout.start * 1e9) + np.round(holdout.time * 1e9).astype(np.int64)
     measured = np.where(holdout.weight > 0, holdout.measured, np.nan)
-    writer = LogWriter(
-        path, {"diagnosis": {"log": holdout.name, "prefixes": "measured nominal refit corrected residual"}}
-    )
+    about = {"log": holdout.name, "prefixes": "measured nominal refit corrected residual"}
+    writer = LogWriter(path, {"diagnosis": about}, bag_folder=False)
     complete = False
     try:
         _write_inputs(writer, holdout, stamps)

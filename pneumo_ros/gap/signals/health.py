@@ -10,12 +10,13 @@ from scipy.ndimage import median_filter
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.noise import quantum, white_noise
-from pneumo_ros.gap.signals.types import MEASURED, Limitation
+from pneumo_ros.gap.signals.types import MEASURED, NO_VERDICT, Limitation
 
 Array = NDArray[np.float64]
 
 MIN_RUN = 10  # equal samples in a row that are suspicious at all
 QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion stays within a step
+FEW = 100  # samples from which a typical run length is taken
 RUN_FACTOR = 5.0  # times the run length that quantisation explains elsewhere in the channel
 GLITCH_SIGMA = 15.0
 MOSTLY = 0.5  # a channel with fewer real samples than this share is left out
@@ -41,13 +42,14 @@ class Checked(NamedTuple):
     limitations: list[Limitation]
 
 
-def check_channel(name: str, values: Array, weight: Array, stated_noise: float) -> Checked:
+def check_channel(name: str, values: Array, weight: Array, stated_noise: float, log: str = "log") -> Checked:
     """Look at one channel of :data:`MEASURED` on the uniform base.
 
     Parameters
     ----------
     values, weight : (N,)
     stated_noise : the config's standard deviation, 0 if it states none
+    log : its name, for messages
 
     Raises
     ------
@@ -56,13 +58,15 @@ def check_channel(name: str, values: Array, weight: Array, stated_noise: float) 
     """
     if not weight.any():
         return Checked(weight, stated_noise, [missing(name)])
-    _check_unit(name, values[weight > 0])
+    _check_unit(name, values[weight > 0], log)
     if np.ptp(values[weight > 0]) == 0.0:
         return Checked(np.zeros_like(weight), stated_noise, [_left_out(name, "constant", "never changes")])
-    noise = white_noise(values, weight)
-    noise = stated_noise if not np.isfinite(noise) else noise
     found: list[Limitation] = []
-    weight = _without_stuck(name, values, weight, found)
+    kept = _without_stuck(name, values, weight, found)
+    if kept.sum() < MOSTLY * weight.sum():
+        return Checked(np.zeros_like(weight), stated_noise, [*found, _left_out(name, "mostly_stuck", "mostly stands")])
+    weight, noise = kept, white_noise(values, kept)
+    noise = noise if np.isfinite(noise) and noise > 0.0 else stated_noise
     weight = _without_glitches(name, values, weight, noise, found)
     if weight.mean() < MOSTLY and not _merely_slow(weight):
         return Checked(np.zeros_like(weight), noise, [*found, _left_out(name, "mostly_missing", "is mostly missing")])
@@ -70,9 +74,9 @@ def check_channel(name: str, values: Array, weight: Array, stated_noise: float) 
     return Checked(weight, noise, found)
 
 
-def missing(name: str) -> Limitation:
+def missing(name: str, why: str = "is not in the log") -> Limitation:
     """The limitation of a channel that the log does not carry."""
-    return Limitation("missing_channel", f"{name} is not in the log: {LOST[name]}.", (name,), 0.85)
+    return Limitation("missing_channel", f"{name} {why}: {LOST[name]}.", (name,), 0.85)
 
 
 def _left_out(name: str, code: str, why: str) -> Limitation:
@@ -85,18 +89,18 @@ def _merely_slow(weight: Array) -> bool:
     return len(steps) > 0 and float(np.percentile(steps, 99)) <= 1.5 * float(np.median(steps)) + 1.0
 
 
-def _check_unit(name: str, values: Array) -> None:
+def _check_unit(name: str, values: Array, log: str) -> None:
     middle = float(np.median(np.abs(values)))
     if name.endswith("pressure"):
         low, high = PRESSURE_RANGE
         if not low <= middle <= high:
             raise InputError(
-                "pressure not in Pa absolute", where=f"/rig/{name.replace('_', '/')}", value=round(middle, 6),
+                "pressure not in Pa absolute", where=f"{log}, /rig/{name.replace('_', '/')}", value=round(middle, 6),
                 allowed=f"{low:g} to {high:g} Pa", remedy="convert the log (gauge to absolute, bar or psi to Pa)",
             )  # fmt: skip
     elif middle > DISPLACEMENT_LIMIT:
         raise InputError(
-            "displacement not in metres", where="/rig/displacement", key=name, value=round(middle, 6),
+            "displacement not in metres", where=f"{log}, /rig/displacement", key=name, value=round(middle, 6),
             allowed=f"up to {DISPLACEMENT_LIMIT} m", remedy="convert the log (mm or in to m)",
         )  # fmt: skip
 
@@ -105,9 +109,12 @@ def _without_stuck(name: str, values: Array, weight: Array, found: list[Limitati
     real = np.flatnonzero(weight)
     starts = np.flatnonzero(np.concatenate([[True], np.diff(values[real]) != 0.0]))
     lengths = np.diff(np.append(starts, len(real)))
-    # The median run, weighted by samples, is what quantisation makes of normal motion.
-    typical = float(np.median(np.repeat(lengths, lengths)))
-    shortest = QUANTISED_RUN if quantum(values[real]) > 0.0 else MIN_RUN
+    # The median run, weighted by samples, is what quantisation makes of normal motion. The levels where a channel may
+    # stand (its ends, its most frequent one) say nothing of that: a channel that mostly stands would excuse itself.
+    moving = _moving(values[real])
+    runs = lengths[moving[starts]]
+    typical = float(np.median(np.repeat(runs, runs))) if len(runs) else 1.0
+    shortest = QUANTISED_RUN if quantum(values[real][moving]) > 0.0 else MIN_RUN
     stuck = np.flatnonzero(lengths >= max(shortest, RUN_FACTOR * typical))
     if not len(stuck):
         return weight
@@ -120,6 +127,14 @@ def _without_stuck(name: str, values: Array, weight: Array, found: list[Limitati
     text = f"{name} {word} in {100 * share:.1f} % of its samples; these are not used."
     found.append(Limitation(code, text, (name,), 1.0 if share < 0.02 else 0.8))
     return kept
+
+
+def _moving(values: Array) -> NDArray[np.bool_]:
+    """Samples at levels other than the lowest, the highest and the most frequent one; all, if that leaves few."""
+    levels, counts = np.unique(values, return_counts=True)
+    doubtful = (levels[0], levels[-1], levels[int(np.argmax(counts))])
+    inner = ~np.isin(values, doubtful)
+    return inner if np.count_nonzero(inner) >= FEW else np.ones(len(values), dtype=bool)
 
 
 def _without_glitches(name: str, values: Array, weight: Array, noise: float, found: list[Limitation]) -> Array:
@@ -150,8 +165,8 @@ def all_limits(weight: Array, measured: Array, noise: Array) -> list[Limitation]
     found = []
     if np.count_nonzero(used) < 3:
         names = ", ".join(name for name, ok in zip(MEASURED, used, strict=True) if ok) or "none"
-        found.append(Limitation("too_few_channels", f"Only these channels are usable: {names}; no verdict.", (), 0.0))
+        found.append(Limitation("too_few_channels", f"Only these channels are usable: {names}{NO_VERDICT}", (), 0.0))
     moved = [np.std(measured[weight[:, i] > 0, i]) > 5.0 * noise[i] for i in range(len(MEASURED)) if used[i]]
     if moved and not any(moved):
-        found.append(Limitation("no_motion", "Nothing moved: every channel is within its noise; no verdict.", (), 0.0))
+        found.append(Limitation("no_motion", f"Nothing moved: every channel is within its noise{NO_VERDICT}", (), 0.0))
     return found

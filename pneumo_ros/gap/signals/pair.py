@@ -17,7 +17,7 @@ NOT_THE_RIG = ("displacement_noise", "pressure_noise")
 
 
 def check_pair(fit: Sequence[Signals], holdout: Signals | None = None) -> None:
-    """Refuse logs of different rigs and a holdout that is one of the fit logs.
+    """Refuse logs of different rigs, a log given twice, and a holdout that is one of the fit logs.
 
     Raises
     ------
@@ -34,6 +34,13 @@ def check_pair(fit: Sequence[Signals], holdout: Signals | None = None) -> None:
             raise InputError(
                 f"{logs[0].name} and {other.name} are of two rigs", key=different, value=values,
                 remedy="diagnose each rig from its own logs, or give --rig if the configs are known to be wrong",
+            )  # fmt: skip
+    for k, log in enumerate(fit):
+        twin = next((other for other in fit[:k] if _same_data(other, log)), None)
+        if twin is not None:
+            raise InputError(
+                "the same log is given twice", where=f"{twin.name}, {log.name}",
+                remedy="give each session once: a second copy makes every interval too narrow",
             )  # fmt: skip
     if holdout is not None and any(_same_data(log, holdout) for log in fit):
         raise InputError(

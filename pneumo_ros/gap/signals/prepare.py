@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.signals.health import all_limits, check_channel
+from pneumo_ros.gap.signals.doubts import check_clocks, check_gauge, check_road_unit
+from pneumo_ros.gap.signals.health import all_limits, check_channel, missing
 from pneumo_ros.gap.signals.initial import estimate_initial
 from pneumo_ros.gap.signals.timebase import drivable_span, held, in_order, sampled, split_at_jumps, timing, uniform_grid
 from pneumo_ros.gap.signals.types import COMMANDS, MEASURED, ROADS, Limitation, Signals, TopicData
@@ -48,7 +49,9 @@ def prepare(topics: Mapping[str, TopicData], rig: Rig, name: str = "log", origin
     clean = _one_clock(topics, name, limits)
     grid, period = _grid(clean, name, limits)
     commands, road = _inputs(clean, grid, period, rig, name, limits)
-    measured, weight, noise, stated = _measured(clean, grid, period, rig, limits)
+    check_road_unit(road, name)
+    measured, weight, noise, stated = _measured(clean, grid, period, rig, name, limits)
+    check_gauge(*_middles(measured, weight), rig, name)
     limits += all_limits(weight, measured, noise)
     return Signals(
         name=name,
@@ -89,6 +92,7 @@ def _one_clock(topics: Mapping[str, TopicData], name: str, limits: list[Limitati
         pieces = {topic: [p[best]] for topic, p in pieces.items()}
         text = "The clock was set back during the log; only the longest piece between jumps is used."
         limits.append(Limitation("clock_jump", text, (), 0.9))
+    check_clocks({topic: p[0] for topic, p in pieces.items()}, name)
     ordered = {topic: in_order(p[0]) for topic, p in pieces.items()}
     for topic, (_, reordered, repeated) in ordered.items():
         if reordered or repeated:
@@ -158,11 +162,16 @@ def _required(topics: Mapping[str, TopicData], name: str) -> list[TopicData]:
             )  # fmt: skip
         for channel in channels:
             values = topics[topic].channels.get(channel)
-            if values is None or np.count_nonzero(np.isfinite(values)) < 2:
+            if values is None:
                 raise InputError(
-                    f"no usable '{channel}' in {topic}", where=name, allowed=", ".join(channels),
+                    f"no '{channel}' in {topic}", where=name, allowed=", ".join(channels),
                     value=", ".join(topics[topic].channels) or "no names",
-                    remedy="name the channels as the contract does",
+                    remedy="name the channels as docs/topics.md does",
+                )  # fmt: skip
+            if np.count_nonzero(np.isfinite(values)) < 2:
+                raise InputError(
+                    f"'{channel}' of {topic} holds no number, so the model cannot be driven", where=name,
+                    remedy="record it again",
                 )  # fmt: skip
     return [topics[ROAD], topics[VALVE]]
 
@@ -209,8 +218,14 @@ def _count_nan(topic: str, data: TopicData, names: tuple[str, ...], limits: list
             limits.append(Limitation("nan", text, (), 1.0 if share < 0.01 else 0.8))
 
 
+def _middles(measured: Array, weight: Array) -> tuple[Array, Array]:
+    """Median height and pressure of both springs, (2,) each; NaN where not measured."""
+    known = np.where(weight.any(axis=0), np.median(measured, axis=0), np.nan)
+    return known[:2] - known[2:4], known[4:]
+
+
 def _measured(
-    topics: Mapping[str, TopicData], grid: Array, period: float, rig: Rig, limits: list[Limitation]
+    topics: Mapping[str, TopicData], grid: Array, period: float, rig: Rig, log: str, limits: list[Limitation]
 ) -> tuple[Array, Array, Array, Array]:
     values, weights, noises, stated = [], [], [], []
     for channel in MEASURED:
@@ -219,17 +234,26 @@ def _measured(
         key = "pressure" if channel in PRESSURE else channel
         raw = None if data is None else data.channels.get(key)
         column, weight = np.zeros(len(grid)), np.zeros(len(grid))
-        if data is not None and raw is not None:
+        if data is not None and raw is not None and np.isfinite(raw).any():
             _count_nan(TOPIC_OF[channel], replace_name(data, key, channel), (channel,), limits)
             column, weight = sampled(data.stamp, raw, grid, period)
-        checked = check_channel(channel, column, weight, expected)
-        limits += checked.limitations
+        checked = check_channel(channel, column, weight, expected, log)
+        limits += checked.limitations if weight.any() else [missing(channel, _why_missing(channel, data, raw))]
         values.append(column)
         weights.append(checked.weight)
         noises.append(checked.noise)
         stated.append(expected)
     columns, weight = np.column_stack(values), np.column_stack(weights)
     return _filled(columns, weight, rig), weight, np.array(noises), np.array(stated)
+
+
+def _why_missing(channel: str, data: TopicData | None, raw: Array | None) -> str:
+    topic = TOPIC_OF[channel]
+    if data is None:
+        return f"is not in the log (no {topic})"
+    if raw is None:
+        return f"is not in {topic} (which names {', '.join(data.channels) or 'nothing'})"
+    return f"holds no number in {topic}"
 
 
 def _filled(measured: Array, weight: Array, rig: Rig) -> Array:

@@ -15,6 +15,7 @@ from pneumo_ros.rig import Rig
 MEASURED = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
 COMMANDS = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")
 ROADS = ("front", "rear")
+NO_VERDICT = "; no verdict."  # ends the sentence of a limitation that forbids one
 
 
 class TopicData(NamedTuple):
