@@ -18,7 +18,8 @@ from pneumo_ros.gap.where import Start, conditional_gaps, habitat, locate, place
 from pneumo_ros.gap.where.design import car_of, design_of, inputs_of, sensor_noise
 from pneumo_ros.gap.where.locate import corrected_residual
 from pneumo_ros.gap.where.regimes import bands, harmonics, regimes
-from pneumo_ros.gap.where.solve import Rows, best_subset, box_minimum, forms_of, shapley
+from pneumo_ros.gap.where.sets import best_subset, shapley
+from pneumo_ros.gap.where.solve import Rows, box_minimum, forms_of
 from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
