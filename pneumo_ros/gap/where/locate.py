@@ -8,15 +8,15 @@ the held-out log only judges. Where no such set predicts the held-out log, its o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.held_out import free_run
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.where.along import explained
 from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
 from pneumo_ros.gap.where.sets import FLAT, LARGEST, Closing, best_subset, rivals, shapley, smallest
 from pneumo_ros.gap.where.solve import Forms, Rows, forms_of
@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 # Shapes that close less than this of the held-out squared residual do not know the law: its course in time decides.
 TRUSTED = 0.5
 COURSES = 2  # places in a set with free courses in time: more would follow anything
+SECOND = (
+    0.1  # of the squared residual that a second course must close: bumps 40 ms apart leave a few per cent themselves
+)
 # Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops).
 SENSOR_PASSES = 3
 BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
@@ -51,9 +54,12 @@ class Start:
         """Whether nothing has been fitted yet."""
         return self.nuisance is None and not self.active
 
-    def predict(self, model: RigModel, signals: Signals) -> Array:
-        """(N, 6) the model's free run of a log."""
-        return free_run(model, signals, self.values(model, np.zeros(len(model.parameters))), self.active)
+    def put_into(self, model: RigModel, design: Design) -> Design:
+        """The design of a log without what the started model accounts for."""
+        if self.nominal:
+            return design
+        known = explained(model, design, self.values(model, np.zeros(len(model.parameters))), self.active)
+        return replace(design, residual=design.residual - known * design.weight / design.null)
 
     def offset(self, model: RigModel) -> Array:
         """(P,) standard deviations that the parameters are from nominal."""
@@ -133,12 +139,17 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     names = final.testable()
     chosen = smallest(_halved(fitted, offset, places), names, LARGEST)
     refit_square = max(final.value(()), 1e-12)
-    followed = final.value(chosen) < (1.0 - TRUSTED) * refit_square
     closing: Closing = final
-    if refit_square > FLAT**2 and not followed:
+    if refit_square > FLAT**2 and not _followed(final, chosen):
         courses = courses_of(judge, model, offset)
-        closing, chosen = courses, smallest(courses, courses.candidates(), COURSES)
+        closing, chosen = courses, smallest(courses, courses.candidates(), COURSES, SECOND)
     return _location(closing, final, chosen, names, fitted, judge, start)
+
+
+def _followed(judge: Forms, chosen: Sequence[str]) -> bool:
+    """Whether these places' shapes predict the log held out: most of it, and many of them all of it."""
+    left = judge.value(chosen)
+    return left < (1.0 - TRUSTED) * judge.value(()) and (len(chosen) <= COURSES or left < FLAT**2)
 
 
 def _location(
@@ -189,11 +200,9 @@ def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> 
 
 
 def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
-    explained = [None if start.nominal else start.predict(model, log) for log in logs]
-    first = design_of(model, logs[0], explained=explained[0])
-    yardstick = first.features.yardstick
-    rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
-    designs = [first, *rest]
+    first = design_of(model, logs[0])
+    rest = [design_of(model, log, first.features.yardstick) for log in logs[1:]]
+    designs = [start.put_into(model, design) for design in (first, *rest)]
     offset, places = start.offset(model), [basis.place for basis in first.bases]
     for _ in range(SENSOR_PASSES):
         forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)

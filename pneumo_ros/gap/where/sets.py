@@ -1,4 +1,4 @@
-"""Sets of places: the smallest that closes what can be closed, sets that do nearly as well, and each place's fair share."""
+"""Sets of places: the smallest that closes what can be closed, its rivals, and each place's fair share."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ class Closing(Protocol):
         """Mean square in null standard deviations."""
 
 
-def smallest(closing: Closing, places: Sequence[str], largest: int = LARGEST) -> list[str]:
-    """The smallest set after which further places stop being worth their while."""
+def smallest(closing: Closing, places: Sequence[str], largest: int = LARGEST, least: float = 0.0) -> list[str]:
+    """The smallest set after which further places stop being worth their while.
+
+    A further place must close :data:`WORTH` of what is left, and ``least`` of what was there at first.
+    """
     levels = [closing.value(())]
     sets: list[list[str]] = [[]]
     for size in range(1, min(largest, len(places)) + 1):
@@ -35,7 +38,10 @@ def smallest(closing: Closing, places: Sequence[str], largest: int = LARGEST) ->
     if len(levels) < 2 or (levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]):
         return []
     for size, level in enumerate(levels[1:], start=1):
-        ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]
+        ahead = [
+            levels[k] > level * (1.0 - WORTH) ** (k - size) or level - levels[k] < least * levels[0]
+            for k in range(size + 1, len(levels))
+        ]
         if level < FLAT**2 or all(ahead):
             return sets[size]
     return sets[-1]

@@ -1,10 +1,10 @@
 """Where a gap lives when no shape follows it: which place's equations it moves together, whatever its course in time.
 
-A force that no function of the motion describes (a rotating imbalance, something that strikes, a law met outside what was
-fitted) defeats every shape of :mod:`pneumo_ros.gap.where.flexible`. What gives its place away is the pattern across the
-equations in one window: a spring's force pushes the body up, turns it and pushes its axle down; a tyre's moves one axle
-only; air moves one balance. So a place may add *any* course in time, one value a window, and the price is what that
-many values take of noise. A sensor's error is a course of the channel, carried through the equations.
+A force that no function of the motion describes (a rotating imbalance, something that strikes, a law met outside what
+was fitted) defeats every shape of :mod:`pneumo_ros.gap.where.flexible`. What gives its place away is the pattern across
+the equations in one window: a spring's force pushes the body up, turns it and pushes its axle down; a tyre's moves one
+axle only; air moves one balance. So a place may add *any* course in time, one value a window, and the price is what
+that many values take of noise. A sensor's error is a course of the channel, carried through the equations.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Courses:
     @property
     def rows(self) -> float:
         """Number of residuals."""
-        return float(max(np.count_nonzero(self.residual), 1))
+        return max(float(np.count_nonzero(self.residual)), 1.0)
 
     def value(self, places: Iterable[str]) -> float:
         """Mean square that is left with these places free, each free value counted as noise (null: about one)."""
@@ -102,7 +102,7 @@ def courses_of(design: Design, model: RigModel, offset: Array) -> Courses:
 
 
 def _directions(design: Design, car: HalfCar) -> dict[str, Array]:
-    """Places whose error acts within a window: what a unit of force, moment, flow, pressure or height does, (D, K, 6)."""
+    """(D, K, 6) what a unit of force, moment, flow, pressure or force of the road does in the window where it acts."""
     count, body = len(design.residual), car.body
 
     def unit(**factors: float) -> Array:
