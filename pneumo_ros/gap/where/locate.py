@@ -140,16 +140,11 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     chosen = smallest(_halved(fitted, offset, places), names, LARGEST)
     refit_square = max(final.value(()), 1e-12)
     closing: Closing = final
-    if refit_square > FLAT**2 and not _followed(final, chosen):
+    followed = final.value(chosen) < (1.0 - TRUSTED) * refit_square
+    if refit_square > FLAT**2 and not followed:
         courses = courses_of(judge, model, offset)
         closing, chosen = courses, smallest(courses, courses.candidates(), COURSES, SECOND)
     return _location(closing, final, chosen, names, fitted, judge, start)
-
-
-def _followed(judge: Forms, chosen: Sequence[str]) -> bool:
-    """Whether these places' shapes predict the log held out: most of it, and many of them all of it."""
-    left = judge.value(chosen)
-    return left < (1.0 - TRUSTED) * judge.value(()) and (len(chosen) <= COURSES or left < FLAT**2)
 
 
 def _location(
