@@ -27,7 +27,7 @@ Only = Annotated[str, typer.Option(help="Only cases whose name contains this.")]
 @app.command()
 def make(
     folder: Folder,
-    set_name: Annotated[str, typer.Option("--set", help="full (240 cases), dev, dev2, ci.")] = "dev",
+    set_name: Annotated[str, typer.Option("--set", help="full (240 cases), full-0.1, dev, dev2, dev3, ci.")] = "dev",
     workers: Workers = 1,
     scheduler: Scheduler = "",
     only: Only = "",

@@ -15,7 +15,9 @@ from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
+from pneumo_ros.gap.selection import Thresholds, noise_level, score
 
+NOT_EVIDENT = 0.8  # of the least fall of mean square that counts as evidence
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
@@ -86,10 +88,19 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     _time_jumps(contest)
     _run_singles(contest)
     _time_jumps(contest)
-    if pairs and contest.singles:
+    if pairs and contest.singles and _room_for_more(contest):
         _run_pairs(contest)
         _time_jumps(contest)
     return contest
+
+
+def _room_for_more(contest: Contest) -> bool:
+    """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
+    blocks is the sensors' noise but for less than any threshold.
+    """
+    problem = contest.problem
+    least = min(score(problem, one).level for one in (contest.refit, *contest.finalists))
+    return least - noise_level(problem) > NOT_EVIDENT * Thresholds().least
 
 
 def _time_jumps(contest: Contest) -> None:

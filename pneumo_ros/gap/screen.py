@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product, zip_longest
+from itertools import zip_longest
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.gap.fit import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
 from pneumo_ros.gap.model import Array, EffectParameter, Mask
@@ -113,20 +114,19 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
 
 def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool) -> list[Promise]:
     gram, with_residual, total = _projected(problem, base, found, held)
+    signed = np.array([_signed(problem, trial) for trial in found], dtype=bool)
+    explained = _explained_by_pairs if pairs else _explained_alone
+    share, sizes, members = explained(gram, -with_residual, signed)
     best: dict[tuple[Part, ...], Promise] = {}
-    for members in combinations(range(len(found)), 2) if pairs else product(range(len(found))):
-        parts = tuple(found[m].part for m in members)
-        if pairs and not compatible(parts):
+    for k in np.argsort(-share, kind="stable"):
+        if share[k] <= 0.0:
+            break
+        parts = tuple(found[m].part for m in members[k])
+        if parts in best or (pairs and not compatible(parts)):
             continue
-        signed = np.array([_signed(problem, found[m]) for m in members])
-        share, sizes = _explained(gram, with_residual, members, total, signed)
-        if share > best.get(parts, _NOTHING).share:
-            values = [_scaled(problem, found[m], s) for m, s in zip(members, sizes, strict=True)]
-            best[parts] = Promise(parts, tuple(v for one in values for v in one), share)
-    return sorted(best.values(), key=lambda p: -p.share)
-
-
-_NOTHING = Promise((), (), 0.0)
+        values = [_scaled(problem, found[m], s) for m, s in zip(members[k], sizes[k], strict=True)]
+        best[parts] = Promise(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
+    return list(best.values())
 
 
 def compatible(parts: tuple[Part, ...]) -> bool:
@@ -178,18 +178,24 @@ def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) 
     return gram, with_residual, float(weighted @ weighted)
 
 
-def _explained(
-    gram: Array, with_residual: Array, members: tuple[int, ...], total: float, signed: Mask
-) -> tuple[float, Array]:
-    """Share of the misfit that multiples of the members explain (non-negative where not ``signed``), and the
-    multiples.
+def _explained_alone(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:
+    """What a multiple of each trial explains (zero where it would have to be negative and must not), the multiples
+    (T, 1), and the trials' numbers (T, 1).
     """
-    index = list(members)
-    G, b = gram[np.ix_(index, index)], -with_residual[index]
-    diagonal: Array = np.asarray(np.maximum(np.diag(G), 1e-12))
-    if len(index) == 2 and abs(G[0, 1]) > 0.995 * np.sqrt(diagonal[0] * diagonal[1]):
-        return 0.0, np.zeros(2)
-    sizes: Array = np.asarray(np.linalg.solve(G + np.diag(1e-9 * diagonal), b))
-    if np.any((sizes <= 0.0) & ~signed):
-        return 0.0, sizes
-    return float(np.clip(b @ sizes / total, 0.0, 1.0)), sizes
+    size = b / np.maximum(np.diag(gram), 1e-12)
+    share = np.where((size > 0.0) | signed, b * size, 0.0)
+    return share, size[:, None], np.arange(len(b))[:, None]
+
+
+def _explained_by_pairs(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:
+    """The same for all pairs of trials, (P,), (P, 2), (P, 2); twins that nothing could tell apart, explain nothing."""
+    one, two = np.triu_indices(len(b), 1)
+    first, second = (np.maximum(np.diag(gram), 1e-12)[k] * (1.0 + 1e-9) for k in (one, two))
+    cross = gram[one, two]
+    alike = cross**2 > 0.995**2 * first * second
+    determinant = np.where(alike, 1.0, first * second - cross**2)
+    sizes = np.column_stack([second * b[one] - cross * b[two], first * b[two] - cross * b[one]]) / determinant[:, None]
+    members = np.column_stack([one, two])
+    allowed = ~alike & ((sizes > 0.0) | signed[members]).all(axis=1)
+    share = np.where(allowed, b[one] * sizes[:, 0] + b[two] * sizes[:, 1], 0.0)
+    return share, sizes, members

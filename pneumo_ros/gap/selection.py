@@ -104,6 +104,13 @@ def score(problem: Problem, fit: Fit) -> Scored:
     return Scored(fit, float(np.mean(values)), values, float(np.sum(fit.x[: len(problem.model.parameters)] ** 2)))
 
 
+def noise_level(problem: Problem) -> float:
+    """What white sensor noise alone leaves of the mean square: less than one, sigmas hold a floor for model form."""
+    noise = np.mean([np.asarray(r.noise) ** 2 for r in problem.records], axis=0) / problem.averaged
+    there = problem.weight > 0.0
+    return float(np.sum(problem.weight**2 * noise) / max(1, there.sum()))
+
+
 def advantage(poorer: Scored, richer: Scored) -> float:
     """Fall of log mean square from the poorer to the richer structure."""
     return float(np.log((FORM + poorer.level) / (FORM + richer.level)))

@@ -52,10 +52,13 @@ class Mix:
     decoys: int  # cases that also lose an effect they do not have, so that a withheld id gives nothing away
 
 
+# A release opens its full set once and gets a new seed; the sets of earlier releases stay by name.
 SETS: dict[str, Mix] = {
-    "full": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
+    "full": Mix(20262, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
+    "full-0.1": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
     "dev": Mix(1, none=16, single=25, pair=9, unknown=7, withheld=3, decoys=3),
     "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),
+    "dev3": Mix(3, none=8, single=72, pair=20, unknown=14, withheld=8, decoys=4),
 }
 # Six cases for every change of the code: their sizes are fixed, so that making one is three simulations.
 CI: tuple[Planned, ...] = (
