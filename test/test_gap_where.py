@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,14 +12,25 @@ import pytest
 from rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
+from pneumo_ros.gap.compose import CORRECTIONS
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, prepare, read_signals
-from pneumo_ros.gap.where import Start, conditional_gaps, habitat, locate, place_gaps, predict_located
+from pneumo_ros.gap.where import (
+    Start,
+    conditional_gaps,
+    flexible_gain,
+    habitat,
+    locate,
+    place_gaps,
+    predict_located,
+)
+from pneumo_ros.gap.where.along import explained
 from pneumo_ros.gap.where.design import car_of, design_of, inputs_of, sensor_noise
 from pneumo_ros.gap.where.locate import corrected_residual
 from pneumo_ros.gap.where.regimes import bands, harmonics, regimes
-from pneumo_ros.gap.where.solve import Rows, best_subset, box_minimum, forms_of, shapley
+from pneumo_ros.gap.where.sets import best_subset, rivals, shapley, smallest
+from pneumo_ros.gap.where.solve import Rows, box_minimum, forms_of
 from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
@@ -107,6 +119,28 @@ def test_exchange_finds_two_places_that_only_work_together() -> None:
     assert set(best_subset(forms, 2, ["decoy"], names)) == {"left", "right"}
 
 
+class Left:
+    """What is left of 100 by each set of places, as a table."""
+
+    def __init__(self, left: dict[frozenset[str], float]) -> None:
+        self.left = left
+
+    def value(self, places: Iterable[str]) -> float:
+        return self.left.get(frozenset(places), 100.0)
+
+
+def test_a_second_place_must_be_worth_it() -> None:
+    closing = Left({frozenset("a"): 5.0, frozenset("ab"): 2.0})
+    assert smallest(closing, ["a", "b"], 2) == ["a", "b"]
+    assert smallest(closing, ["a", "b"], 2, least=0.1) == ["a"]
+
+
+def test_both_ends_may_do_what_one_place_for_both_does() -> None:
+    pair = ("front_air", "rear_air")
+    closing = Left({frozenset(["supply"]): 1.0, frozenset(pair): 1.1, frozenset(["front_air"]): 40.0})
+    assert [places for places, _ in rivals(closing, ["supply"], ["supply", *pair])] == [pair]
+
+
 CASES = {
     "none": ((), set()),
     "friction rear": ((("coulomb_friction", "rear", (8.0,)),), {"rear_force"}),
@@ -148,6 +182,64 @@ def test_the_right_effect_leaves_nothing_to_locate(model: RigModel) -> None:
     nominal = np.array([p.nominal for p in model.parameters])
     assert locate(model, [fit], holdout, Start(nominal, truth)).flat
     assert locate(model, [fit], holdout, Start(nominal, truth[:1])).chosen == ("front_air",)
+
+
+def log_with_force(model: RigModel, carrier: str, phase: float, seed: int) -> Signals:
+    """A log of the rig with 12 N of a 7 Hz force at a place: no function of the motion, another phase each time."""
+    clean, road, commands = simulated(SECONDS, seed)
+    held = np.zeros((len(road), len(CORRECTIONS)))
+    held[:, CORRECTIONS.index(carrier)] = 12.0 * np.sin(2.0 * np.pi * 7.0 * np.arange(len(road)) * 0.002 + phase)
+    driven = model.simulate(signals_of(clean, road, commands, seed), correction=held)
+    return signals_of(driven, road, commands, seed)
+
+
+@pytest.mark.parametrize("place", ["front_tyre", "rear_force", "body_pitch"])
+def test_a_force_that_follows_no_motion_is_known_by_the_equations_it_moves(model: RigModel, place: str) -> None:
+    location = locate(model, [log_with_force(model, place, 0.0, 4)], log_with_force(model, place, 2.0, 5))
+    assert location.chosen == (place,) and location.shares[0][1] > 0.7
+
+
+def test_a_sensor_with_a_course_of_its_own_is_told_from_a_force(model: RigModel) -> None:
+    logs = []
+    for seed in (4, 5):
+        log = log_with(model, (), seed)
+        rng = np.random.default_rng(seed)
+        knots = np.arange(0.0, SECONDS + 1.0, 0.15)
+        wander = np.interp(np.arange(len(log.measured)) * log.period, knots, rng.normal(size=len(knots)))
+        measured = log.measured.copy()
+        measured[:, MEASURED.index("unsprung_rear")] += 3e-4 * wander
+        logs.append(replace(log, measured=measured))
+    location = locate(model, logs[:1], logs[1])
+    assert location.shares[0][0] == "sensor:unsprung_rear" and not location.followed
+
+
+def test_a_wrong_structure_keeps_the_gap_and_the_right_one_does_not(model: RigModel) -> None:
+    """Viscous damping in place of dry friction brings the free run closer; the equations tell."""
+    friction = active_of(model, CASES["friction rear"][0])
+    fit, holdout = log_with(model, friction, 6), log_with(model, friction, 7)
+    nominal = np.array([p.nominal for p in model.parameters])
+    before = locate(model, [fit], holdout)
+    right = flexible_gain(model, [fit], holdout, nominal, friction, before)
+    damping = (Active("viscous_damping", "rear", (40.0,)),)
+    wrong = flexible_gain(model, [fit], holdout, nominal, damping, before)
+    assert right.kept < 0.05 and right.log_ratio == pytest.approx(0.0, abs=0.1) and right.places == ()
+    assert wrong.kept > 0.3 and wrong.log_ratio > 1.0 and wrong.places == ("rear_force",)
+    assert 0.0 < wrong.spread < 0.5 * wrong.log_ratio
+    nothing = log_with(model, (), 6), log_with(model, (), 7)
+    assert flexible_gain(model, [nothing[0]], nothing[1], nominal, ()).log_ratio == 0.0
+
+
+def test_effects_act_along_the_measured_motion(model: RigModel) -> None:
+    """A leak that the model lacks makes it sink; the friction in it is nevertheless taken where the rig was."""
+    truth = active_of(model, CASES["friction and leak"][0])
+    log = log_with(model, truth, 6)
+    nominal = np.array([p.nominal for p in model.parameters])
+    design = design_of(model, log)
+    missing = design.residual * design.null
+    known = explained(model, design, nominal, truth[:1])
+    left = np.sqrt(np.mean((missing - known) ** 2, axis=0)) / np.sqrt(np.mean(missing**2, axis=0))
+    assert left[EQUATIONS.index("rear_axle")] < 0.2
+    assert left[EQUATIONS.index("front_air")] == pytest.approx(1.0, abs=0.02)
 
 
 def test_mending_the_right_place_closes_the_free_run(model: RigModel) -> None:

@@ -89,7 +89,7 @@ def _findings(
         phrases={name: effect.summary for name, effect in model.library.items()},
         regimes=_sentences(where, holdout, error) if telling else [],
         conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),
-        mended=_mended(model, where) if telling and diagnosis.verdict == "unknown" else None,
+        mended=_mended(model, where) if telling and where.followed and diagnosis.verdict == "unknown" else None,
         laws=[missing_law(where, place) for place in _one_of_a_kind(where)] if telling else [],
     )
 

@@ -1,6 +1,8 @@
 """Where the gap lives: equation residuals in weak form, flexible corrections by place, regimes, conditional runs."""
 
 from pneumo_ros.gap.where.conditional import conditional_gaps as conditional_gaps
+from pneumo_ros.gap.where.gain import FlexibleGain as FlexibleGain
+from pneumo_ros.gap.where.gain import flexible_gain as flexible_gain
 from pneumo_ros.gap.where.habitat import Habitat as Habitat
 from pneumo_ros.gap.where.habitat import habitat as habitat
 from pneumo_ros.gap.where.law import Law as Law

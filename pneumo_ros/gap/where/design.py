@@ -82,18 +82,12 @@ def design_of(
     model: RigModel,
     signals: Signals,
     yardstick: Yardstick | None = None,
-    explained: Array | None = None,
     seed: int = 0,
 ) -> Design:
-    """Residuals and columns of a log about the nominal parameters; logs that share coefficients share a yardstick.
-
-    ``explained`` (N, 6) is what a better model predicts for the log's channels: what its own motion leaves of the
-    nominal equations is then taken off, so that only what that model misses remains.
-    """
+    """Residuals and columns of a log about the nominal parameters; logs that share coefficients share a yardstick."""
     car, inputs = car_of(model), inputs_of(signals)
     windows = make_windows(len(signals.measured), signals.period)
     residual = weak_residuals(car, inputs, windows)
-    known = 0.0 if explained is None else weak_residuals(car, inputs._replace(measured=explained), windows)
     features = features_of(signals, car, yardstick)
     bases = all_bases(features)
     null = np.hypot(sensor_noise(car, inputs, windows, signals.noise, seed), model_form(car, features))
@@ -101,7 +95,7 @@ def design_of(
     columns = np.array([_column(basis, car, inputs, windows, residual, features, FIRST_SENSOR_STEP) for basis in bases])
     whitened = weight / null
     return Design(
-        (residual - known) * whitened,
+        residual * whitened,
         _parameter_columns(model, inputs, windows, residual) * whitened,
         columns * whitened,
         null,

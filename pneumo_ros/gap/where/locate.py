@@ -2,34 +2,35 @@
 
 The corrections are fitted to the weak residuals of the logs to fit and judged on those of the log held out, always with
 the uncertain parameters free inside their tolerances. The set is chosen on alternate blocks of the logs to fit, so that
-the held-out log only judges.
+the held-out log only judges. Where no such set predicts the held-out log, its own equations say which places move.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.held_out import free_run
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
+from pneumo_ros.gap.where.along import explained
 from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
-from pneumo_ros.gap.where.solve import Forms, Rows, best_subset, forms_of, shapley
+from pneumo_ros.gap.where.sets import FLAT, LARGEST, Closing, best_subset, rivals, shapley, smallest
+from pneumo_ros.gap.where.solve import Forms, Rows, forms_of
+from pneumo_ros.gap.where.time_course import courses_of
 from pneumo_ros.gap.where.weak import EQUATIONS
 
 Array = NDArray[np.float64]
 
-# In null standard deviations (rms). Rigs with nothing but tolerances stay below 1.25 whatever laws they are made with,
-# and no single place closes more than a fifth of that.
-FLAT = 1.5
-SINGLED_OUT = 0.3
-LARGEST = 5  # places in a set: two effects at both ends, and one more to see that it is not needed
-# A further place must take this share of what is left (mean square) to be believed.
-WORTH = 0.4
+# Shapes that close less than this of the held-out squared residual do not know the law: its course in time decides.
+TRUSTED = 0.5
+COURSES = 2  # places in a set with free courses in time: more would follow anything
+SECOND = (
+    0.1  # of the squared residual that a second course must close: bumps 40 ms apart leave a few per cent themselves
+)
 # Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops).
 SENSOR_PASSES = 3
 BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
@@ -53,9 +54,12 @@ class Start:
         """Whether nothing has been fitted yet."""
         return self.nuisance is None and not self.active
 
-    def predict(self, model: RigModel, signals: Signals) -> Array:
-        """(N, 6) the model's free run of a log."""
-        return free_run(model, signals, self.values(model, np.zeros(len(model.parameters))), self.active)
+    def put_into(self, model: RigModel, design: Design) -> Design:
+        """The design of a log without what the started model accounts for."""
+        if self.nominal:
+            return design
+        known = explained(model, design, self.values(model, np.zeros(len(model.parameters))), self.active)
+        return replace(design, residual=design.residual - known * design.weight / design.null)
 
     def offset(self, model: RigModel) -> Array:
         """(P,) standard deviations that the parameters are from nominal."""
@@ -85,7 +89,9 @@ class Location:
     equations : per equation the level (``nominal``, ``refit``, ``chosen``)
     nuisance : (P,) parameters that go with ``chosen``, in standard deviations from the start's
     coefficients : of every basis, zero outside ``chosen``
-    designs : the fitted logs' problems and the judge's, for what comes after (regimes, simulation)
+    fit, judge : the fitted logs' problems and the judge's, for what comes after (regimes, simulation)
+    followed : shapes of the chosen places follow what is missing there; if not, the places are known by the equations
+        that a free course in time closes (:mod:`pneumo_ros.gap.where.time_course`)
     """
 
     shares: tuple[tuple[str, float], ...]
@@ -101,6 +107,7 @@ class Location:
     judge: Design
     forms: Forms
     start: Start
+    followed: bool = True
 
     @property
     def flat(self) -> bool:
@@ -126,35 +133,54 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     start = start or Start()
     designs = _designs(model, [*fit, holdout], start)
     fitted, judge = designs[:-1], designs[-1]
-    offset, count = start.offset(model), len(model.parameters)
+    offset = start.offset(model)
     places = [basis.place for basis in judge.bases]
-    choice = _halved(fitted, offset, places)
     final = forms_of(_stacked(fitted), _stacked([judge]), offset, places)
     names = final.testable()
-    chosen = _smallest(choice, names)
-    sets = chosen or best_subset(choice, min(3, len(names)), [], names)
+    chosen = smallest(_halved(fitted, offset, places), names, LARGEST)
     refit_square = max(final.value(()), 1e-12)
-    shares = {place: max(part, 0.0) / refit_square for place, part in shapley(final, sets).items()}
-    alone = {place: 1.0 - final.value([place]) / refit_square for place in names}
+    closing: Closing = final
+    followed = final.value(chosen) < (1.0 - TRUSTED) * refit_square
+    if refit_square > FLAT**2 and not followed:
+        courses = courses_of(judge, model, offset)
+        closing, chosen = courses, smallest(courses, courses.candidates(), COURSES, SECOND)
+    return _location(closing, final, chosen, names, fitted, judge, start)
+
+
+def _location(
+    closing: Closing,
+    forms: Forms,
+    chosen: Sequence[str],
+    names: Sequence[str],
+    fitted: Sequence[Design],
+    judge: Design,
+    start: Start,
+) -> Location:
+    """Everything that is said of a set of places, ``closing`` having judged it."""
+    count = forms.parameters
+    before = max(closing.value(()), 1e-12)
+    shares = shapley(closing, chosen or best_subset(closing, min(3, len(names)), [], names))
+    alone = {place: 1.0 - closing.value([place]) / before for place in names}
     return Location(
-        shares=_sorted(shares),
+        shares=_sorted({place: max(part, 0.0) / before for place, part in shares.items()}),
         chosen=tuple(sorted(chosen, key=lambda place: -shares[place])),
         alone=_sorted({place: share for place, share in alone.items() if share > 0.0}),
-        rivals=_rivals(final, chosen, names),
+        rivals=rivals(closing, chosen, names),
         level={
-            "nominal": float(np.sqrt(judge.residual[judge.weight > 0] @ judge.residual[judge.weight > 0] / final.rows)),
-            "refit": float(np.sqrt(refit_square)),
-            "chosen": float(np.sqrt(final.value(chosen))),
-            "flexible": float(np.sqrt(final.value(names))),
+            "nominal": float(np.sqrt(judge.residual[judge.weight > 0] @ judge.residual[judge.weight > 0] / forms.rows)),
+            "refit": float(np.sqrt(forms.value(()))),
+            "chosen": float(np.sqrt(forms.value(chosen))),
+            "flexible": float(np.sqrt(forms.value(names))),
         },
-        equations=_by_equation(judge, final, chosen),
-        nuisance=final.coefficients(chosen)[:count],
-        coefficients=spread(final, chosen),
-        refit_nuisance=final.coefficients(())[:count],
+        equations=_by_equation(judge, forms, chosen),
+        nuisance=forms.coefficients(chosen)[:count],
+        coefficients=spread(forms, chosen),
+        refit_nuisance=forms.coefficients(())[:count],
         fit=tuple(fitted),
         judge=judge,
-        forms=final,
+        forms=forms,
         start=start,
+        followed=closing is forms,
     )
 
 
@@ -169,11 +195,9 @@ def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> 
 
 
 def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
-    explained = [None if start.nominal else start.predict(model, log) for log in logs]
-    first = design_of(model, logs[0], explained=explained[0])
-    yardstick = first.features.yardstick
-    rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
-    designs = [first, *rest]
+    first = design_of(model, logs[0])
+    rest = [design_of(model, log, first.features.yardstick) for log in logs[1:]]
+    designs = [start.put_into(model, design) for design in (first, *rest)]
     offset, places = start.offset(model), [basis.place for basis in first.bases]
     for _ in range(SENSOR_PASSES):
         forms = forms_of(_stacked(designs[:-1]), _stacked(designs[:-1]), offset, places)
@@ -206,36 +230,6 @@ def _halved(designs: Sequence[Design], offset: Array, places: Sequence[str]) -> 
 def _odd_rows(design: Design) -> NDArray[np.bool_]:
     block = (design.windows.centres * design.signals.period / BLOCK).astype(int)
     return np.repeat(block % 2 == 1, len(EQUATIONS))
-
-
-def _smallest(forms: Forms, places: Sequence[str]) -> list[str]:
-    """The smallest set after which further places stop being worth their while."""
-    levels = [forms.value(())]
-    sets: list[list[str]] = [[]]
-    for size in range(1, min(LARGEST, len(places)) + 1):
-        sets.append(best_subset(forms, size, sets[-1], places))
-        levels.append(forms.value(sets[-1]))
-    if len(levels) < 2 or (levels[0] < FLAT**2 and levels[1] > (1.0 - SINGLED_OUT) * levels[0]):
-        return []
-    for size, level in enumerate(levels[1:], start=1):
-        ahead = [levels[k] > level * (1.0 - WORTH) ** (k - size) for k in range(size + 1, len(levels))]
-        if level < FLAT**2 or all(ahead):
-            return sets[size]
-    return sets[-1]
-
-
-def _rivals(forms: Forms, chosen: Sequence[str], places: Sequence[str]) -> tuple[tuple[tuple[str, ...], float], ...]:
-    """Sets that differ from the chosen one by one place and leave at most a quarter more."""
-    limit = 1.25**2 * max(forms.value(chosen), 1.0)
-    found = []
-    for k in range(len(chosen)):
-        for place in places:
-            if place in chosen:
-                continue
-            other = [*chosen[:k], place, *chosen[k + 1 :]]
-            if forms.value(other) < limit:
-                found.append((tuple(other), float(np.sqrt(forms.value(other)))))
-    return tuple(sorted(found, key=lambda rival: rival[1])[:5])
 
 
 def _by_equation(judge: Design, forms: Forms, chosen: Sequence[str]) -> dict[str, dict[str, float]]:

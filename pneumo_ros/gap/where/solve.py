@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -162,50 +161,3 @@ def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
         if moved < 1e-5:
             break
     return x
-
-
-def best_subset(forms: Forms, size: int, start: Sequence[str], places: Sequence[str]) -> list[str]:
-    """Subset of ``size`` places with the lowest value: grown from ``start``, then improved by exchanges.
-
-    Growth alone is not enough: two places that only work together (both ends of a rig) are found by the exchange.
-    """
-    chosen = list(start)
-    while len(chosen) < size:
-        chosen.append(min((p for p in places if p not in chosen), key=lambda p: forms.value([*chosen, p])))
-    improving = True
-    while improving:
-        improving = False
-        for k in range(len(chosen)):
-            others = [p for p in places if p not in chosen]
-            trials = [[*chosen[:k], p, *chosen[k + 1 :]] for p in others]
-            if not trials:
-                return chosen
-            best = min(trials, key=forms.value)
-            if forms.value(best) < forms.value(chosen) * (1.0 - 1e-6):
-                chosen, improving = best, True
-    return chosen
-
-
-def shapley(forms: Forms, places: Sequence[str]) -> dict[str, float]:
-    """Each place's fair share of ``value(nothing) - value(places)``, averaged over all orders of adding them."""
-    count = len(places)
-    weights = _order_weights(count)
-    out = dict.fromkeys(places, 0.0)
-    for size in range(count):
-        for subset in combinations(places, size):
-            before = forms.value(subset)
-            for place in places:
-                if place not in subset:
-                    out[place] += weights[size] * (before - forms.value([*subset, place]))
-    return out
-
-
-def _order_weights(count: int) -> list[float]:
-    """Probability that exactly a given subset of each size comes before a given place."""
-    weights = []
-    for size in range(count):
-        choose = 1.0
-        for k in range(size):
-            choose *= (count - 1 - k) / (k + 1)
-        weights.append(1.0 / (count * choose))
-    return weights

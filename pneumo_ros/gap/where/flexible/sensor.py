@@ -8,7 +8,7 @@ from pneumo_ros.gap.signals import MEASURED
 from pneumo_ros.gap.where.features import Features, lagged
 from pneumo_ros.gap.where.flexible.basis import Basis
 
-LAGS = (0.005, 0.03)  # s
+LAGS = (0.005, 0.02, 0.08)  # s; the last for gauge lines
 SHARE = 0.1
 
 
