@@ -169,7 +169,7 @@ def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> 
 
 
 def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Design]:
-    explained = [None if start.nominal else start.predict(model, log) for log in logs]
+    explained = [None if start.nominal and not model.standing else start.predict(model, log) for log in logs]
     first = design_of(model, logs[0], explained=explained[0])
     yardstick = first.features.yardstick
     rest = [design_of(model, log, yardstick, known) for log, known in zip(logs[1:], explained[1:], strict=True)]
