@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+import zlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -29,6 +30,7 @@ LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
 GRADE_TOLERANCE = 0.04  # relative
 QUICK_TRIES, CAREFUL_TRIES = 5, 9
+DRAWS, ACTS = 4, 0.5  # draws at most; share of the grade that each effect must reach alone
 RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
 
 
@@ -55,6 +57,7 @@ class Graded:
     size: float
     gap: float
     ratio: float
+    weakest: float  # ratio of the weakest of its effects alone
     applied: tuple[Applied, ...]
 
 
@@ -82,8 +85,20 @@ def made(case: Planned, folder: Path, labels: Path) -> Path:
 
 
 def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
-    """Label, the three sessions and what the config of each says."""
-    rng = np.random.default_rng(case.seed)
+    """Label, the three sessions and what the config of each says.
+
+    A draw in which an effect hardly acts (a wheel that cannot lift before the rig leaves its range) is drawn anew: a
+    label must not name what is not there.
+    """
+    for draw in range(DRAWS):
+        label, sessions, configs = _drawn(case, draw, on)
+        if label["weakest"] >= ACTS * case.grade:
+            break
+    return label, sessions, configs
+
+
+def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
+    rng = np.random.default_rng(case.seed if draw == 0 else [case.seed, draw])
     drawn, sigmas = drawn_rig(on.nominal, rng)
     twin = real_twin(drawn, on.nominal, on.references, rng)
     fit, held, edit = (_rideable(scene, twin, on) for scene in scenes(rng, case.imperfect))
@@ -101,8 +116,10 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
         "grade": case.grade,
         "ratio": {"fit": graded.ratio, "holdout": shown / held_floor},
         "gap": {"fit": graded.gap, "holdout": shown, "floor_fit": null.gap, "floor_holdout": held_floor},
+        "weakest": graded.weakest if case.effects else 0.0,
         "withheld": list(case.withhold),
         "seed": case.seed,
+        "draw": draw,
         "tolerances_sigma": sigmas,
         "scenes": [asdict(scene) for scene in three],
     }
@@ -157,8 +174,9 @@ def _refitted(session: Session, on: Bench, start: Logs | None = None) -> tuple[f
 
 def _applied(case: Planned, twin: TwinRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
     out, rig = [], twin
-    for i, ((name, side), size) in enumerate(zip(case.effects, sizes, strict=True)):
-        done = get(name).apply(rig, size, side, np.random.default_rng([seed, i]))
+    for (name, side), size in zip(case.effects, sizes, strict=True):
+        # By name: an effect is the same alone, where it is sized, and in a pair.
+        done = get(name).apply(rig, size, side, np.random.default_rng([seed, zlib.crc32(name.encode())]))
         rig = done.rig
         out.append(done)
     return tuple(out)
@@ -172,20 +190,25 @@ def _combined(twin: TwinRig, applied: tuple[Applied, ...]) -> tuple[TwinRig, flo
 
 def _graded(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
     """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
-    sizes = []
-    for i in range(len(case.effects)):
-        alone = replace(case, effects=(case.effects[i],))
-        sizes.append(case.size or _search(alone, twin, scene, null, seed, on))
+    sizes, weakest = [], math.inf
+    for one in case.effects:
+        size, alone = case.size, case.grade
+        if size is None:
+            size, alone = _search(replace(case, effects=(one,)), twin, scene, null, seed, on)
+        sizes.append(size)
+        weakest = min(weakest, alone)
     applied = _applied(case, twin, tuple(sizes), seed)
     rig, road_gain = _combined(twin, applied)
     value = null.gap
     if applied:
         value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
-    return Graded(max(sizes, default=0.0), value, value / null.gap, applied)
+    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, applied)
 
 
-def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> float:
-    """Size whose refit gap is ``case.grade`` floors: the quick ruler finds the neighbourhood, the refit decides."""
+def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
+    """Size whose refit gap is ``case.grade`` floors, and how many it is: the quick ruler finds the neighbourhood, the
+    refit decides.
+    """
 
     def ratio_at(size: float, careful: bool) -> float:
         rig, road_gain = _combined(twin, _applied(case, twin, (size,), seed))
@@ -193,20 +216,21 @@ def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, o
         return _left(session, null, on, careful) / null.gap
 
     start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
-    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)[0]
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)
 
 
 def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
-    """(size, how far off its ratio is): false position on log(excess over the floor) against log(size)."""
+    """(size, its ratio): false position on log(excess over the floor) against log(size)."""
     wanted = 0.5 * math.log(grade**2 - 1.0)
     low: tuple[float, float] | None = None
     high: tuple[float, float] | None = None
-    size, best, closest = start, start, math.inf
+    size, best, closest = start, (start, 0.0), math.inf
     for _ in range(tries):
         ratio = ratio_at(size)
-        off = abs(ratio / grade - 1.0)
+        # As a ratio: an effect sized below its threshold is no nearer to its grade than one three times over.
+        off = abs(math.log(ratio / grade)) if 0.0 < ratio < math.inf else math.inf
         if off < closest:
-            best, closest = size, off
+            best, closest = (size, ratio), off
         if off < GRADE_TOLERANCE or (size >= 1.0 and ratio < grade):
             break
         excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
@@ -215,7 +239,7 @@ def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries
         else:
             high = (math.log(size), excess)
         size = _next_size(low, high, wanted)
-    return best, closest
+    return best
 
 
 def _left(session: Session, null: Null, on: Bench, careful: bool) -> float:

@@ -52,8 +52,7 @@ class Mix:
     decoys: int  # cases that also lose an effect they do not have, so that a withheld id gives nothing away
 
 
-# A release opens its full set once and gets a new seed; the sets of earlier releases stay, so that what the page says
-# of them can be repeated.
+# A release opens its full set once and gets a new seed; the sets of earlier releases stay by name.
 SETS: dict[str, Mix] = {
     "full": Mix(20262, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
     "full-0.1": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
