@@ -204,9 +204,7 @@ def _closed_loop(
 ) -> None:
     from pneumo_ros.session.rerun import draw_rerun
 
-    if diagnosis is not None and rig is not None:
-        raise InputError("two rigs at once", where="--rig", remedy="give --diagnosis or --rig")
-    result = _again(log, overrides, rig) if diagnosis is None else _diagnosed(log, overrides, diagnosis)
+    result = _again(log, overrides, rig) if diagnosis is None else _diagnosed(log, overrides, diagnosis, rig)
     for note in result.notes:
         console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
     console.print(rerun_table(result))
@@ -225,9 +223,11 @@ def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | No
     return rerun(log, overrides, rig, stepped_rig if rig is not None and rig.diagnosed else None)
 
 
-def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path) -> Rerun:
+def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path, rig: Path | None) -> Rerun:
+    """On the rig as diagnosed; ``rig`` is the one that the diagnosis was told, if it was told one."""
     from pneumo_ros.gap.closed_loop import rerun_diagnosed
     from pneumo_ros.gap.signals import read_signals
+    from pneumo_ros.rig import load_rig
     from pneumo_ros.session.inspection import read_setups, seed_of
     from pneumo_ros.session.replay import plan
 
@@ -238,7 +238,8 @@ def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path)
     setups, notes = list(read_setups(log)), list[str]()
     values = [plan(setups, node, overrides.get(node, {}), notes).start for node in ("estimator", "controller")]
     seed = int(seed_of(log).get("plant", 0))
-    result = rerun_diagnosed(read_signals(log.path), document, values[0], values[1], seed)
+    signals = read_signals(log.path, None if rig is None else load_rig(rig))
+    result = rerun_diagnosed(signals, document, values[0], values[1], seed)
     return replace(result, notes=(*result.notes, *notes))
 
 

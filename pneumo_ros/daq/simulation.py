@@ -12,6 +12,7 @@ from pneumo_ros.daq.calibration import SENSORS, Calibration
 from pneumo_ros.daq.frames import Hello
 from pneumo_ros.daq.scaling import input_scale, output_scale
 from pneumo_ros.plant.stepping import SteppedRig, plain_rig
+from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
 from pneumo_ros.road import Road
 
@@ -54,7 +55,7 @@ class RigSimulation:
         settings: SimulationSettings,
         stepped: SteppedRig | None = None,
     ) -> None:
-        self.rig, self.hello, self.settings = rig, hello, settings
+        self.rig, self.hello, self.settings, self.trim = rig, hello, settings, trim(rig)
         self.period = hello.sample_period_us * 1e-6
         self.stepped = plain_rig(rig, self.period) if stepped is None else stepped
         self._state = self.stepped.init()

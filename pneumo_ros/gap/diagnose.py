@@ -31,15 +31,18 @@ class Whereabouts:
     left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
     mendable : the same once the right places get a flexible correction
     flat : noise, tolerances and model form explain what is left
+    kept : share of the equations' gap that this structure leaves; None for the nominal one, which leaves all of it
     """
 
     shares: tuple[tuple[str, float], ...]
     left: float
     mendable: float
     flat: bool
+    kept: float | None = None
 
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
+TELLING = 1.4  # null standard deviations that the equations must show of a gap before they judge a structure
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
@@ -108,8 +111,12 @@ def diagnose(
     base = _final(problem, contest.refit, everything)
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = _runs(problem, base, best, holdout)
-    opinion = judge(refit, finalists, chosen, options.calibration, _on_held_out(runs, holdout))
-    found = _report(problem, contest, opinion, refit, finalists, base, best, runs, holdout, options, tell, notes, edit)
+    tell(0.93, "locating")
+    places = _whereabouts(problem, base, best, holdout, options)
+    opinion = judge(refit, finalists, chosen, options.calibration, _on_held_out(runs, holdout, places))
+    found = _report(
+        problem, contest, opinion, refit, finalists, base, best, runs, places, holdout, options, tell, notes, edit
+    )
     return _within_limits(found, [*fit_logs, holdout])
 
 
@@ -150,6 +157,7 @@ def _report(
     base: Fit,
     best: Fit,
     runs: Mapping[str, HeldOut],
+    places: tuple[Whereabouts | None, Whereabouts | None],
     holdout: Any,
     options: Options,
     tell: Progress,
@@ -157,12 +165,11 @@ def _report(
     edit: Any | None,
 ) -> Diagnosis:
     model = problem.model
-    tell(0.93, "ranking")
+    tell(0.95, "ranking")
     ranking = _ranking(problem, opinion, refit, finalists, base, best, runs, holdout)
     group = ambiguity_group(problem, opinion, finalists, options.limits)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
-    tell(0.95, "locating")
-    before, after = _whereabouts(problem, base, best, holdout, options)
+    before, after = places
     location = _location(problem, opinion, holdout, nuisance, active, runs, before)
     experiment = None
     if options.experiment is not None and len(group) > 1:
@@ -211,9 +218,14 @@ def _runs(problem: Problem, base: Fit, best: Fit, holdout: Any) -> dict[str, Hel
     return runs | {"best": runs["refit"] if best is base else _held(problem, best, holdout)}
 
 
-def _on_held_out(runs: Mapping[str, HeldOut], holdout: Any) -> HeldOutGaps:
+def _on_held_out(
+    runs: Mapping[str, HeldOut], holdout: Any, places: tuple[Whereabouts | None, Whereabouts | None]
+) -> HeldOutGaps:
     floor = total_gap(noise_floor(holdout))
-    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor)
+    before, after = places
+    told = before is not None and before.left > TELLING
+    kept = after.kept if told and after is not None else None
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
 
 
 def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
@@ -330,6 +342,7 @@ def _evidence(
     for name, one in (("refit", before), ("chosen", after)):
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
+            out |= {} if one.kept is None else {f"kept_{name}": one.kept}
     return out | {f"gap_{name}": run.total for name, run in runs.items()}
 
 

@@ -18,7 +18,7 @@ from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
 from pneumo_ros.gap.standing import library_of
-from pneumo_ros.gap.where import Start, locate
+from pneumo_ros.gap.where import Location, flexible_gain, locate
 from pneumo_ros.rig import Rig
 
 
@@ -36,7 +36,7 @@ class Task:
         """Run the diagnosis, with the places of what is left found by flexible corrections."""
         chosen = options or Options()
         if chosen.locate is None:
-            chosen = replace(chosen, locate=whereabouts)
+            chosen = replace(chosen, locate=FlexibleSearch())
         found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
         return replace(found, notes=(*self.notes, *found.notes))
 
@@ -148,9 +148,26 @@ def diagnose_files(
     return prepared(fit, holdout, rig, edit, effects, without).diagnose(options, progress)
 
 
-def whereabouts(
-    model: RigModel, fit: Sequence[Signals], holdout: Signals, nuisance: Array | None, active: Sequence[Active]
-) -> Whereabouts:
-    """Places of what a structure leaves, by flexible corrections of its equations in weak form."""
-    found = locate(model, fit, holdout, Start(nuisance, tuple(active)))
-    return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
+class FlexibleSearch:
+    """Places of what a structure leaves, by flexible corrections of its equations in weak form.
+
+    Keeps the search from the nominal model, which later structures are measured against.
+    """
+
+    def __init__(self) -> None:
+        self.first: Location | None = None
+
+    def __call__(
+        self,
+        model: RigModel,
+        fit: Sequence[Signals],
+        holdout: Signals,
+        nuisance: Array | None,
+        active: Sequence[Active],
+    ) -> Whereabouts:
+        if nuisance is None:
+            self.first = found = locate(model, fit, holdout)
+            return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
+        gain = flexible_gain(model, fit, holdout, nuisance, active, self.first)
+        flat = not gain.places
+        return Whereabouts((), float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)

@@ -32,6 +32,7 @@ class Calibration:
     floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     held : held-out gap over the noise floor that a right structure may leave (jitter, lost samples, jumps between rows)
+    kept : share of the held-out equations' gap left by the best named structure at which "unknown" is as likely as it
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
@@ -43,15 +44,24 @@ class Calibration:
     floor: float = 1.0
     real: float = 2.5
     held: float = 1.5
+    kept: float = 0.25
     held_real: float = 3.0
 
 
 @dataclass(frozen=True)
 class HeldOutGaps:
-    """Gaps on the held-out log in noise floors: of the refit, and of the chosen structure."""
+    """What the held-out log says of the chosen structure.
+
+    Attributes
+    ----------
+    refit, chosen : free-run gaps of the refit and of the chosen structure, in noise floors
+    kept : share of the equations' gap that the chosen structure leaves to flexible corrections; None where the
+        equations show too little of it
+    """
 
     refit: float
     chosen: float
+    kept: float | None = None
 
 
 @dataclass(frozen=True)
@@ -126,6 +136,8 @@ def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: Held
         left = max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9)
         left_held = beyond(held.chosen, calibration.held) / max(beyond(held.refit, 1.0), calibration.held)
         share = (max(np.sqrt(left), left_held) / calibration.leftover) ** calibration.steepness
+        if held.kept is not None:
+            share = max(share, (held.kept / calibration.kept) ** calibration.steepness)
     return float(share / (1.0 + share))
 
 

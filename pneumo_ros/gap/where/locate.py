@@ -56,7 +56,7 @@ class Start:
 
     def put_into(self, model: RigModel, design: Design) -> Design:
         """The design of a log without what the started model accounts for."""
-        if self.nominal:
+        if self.nominal and not model.standing:
             return design
         known = explained(model, design, self.values(model, np.zeros(len(model.parameters))), self.active)
         return replace(design, residual=design.residual - known * design.weight / design.null)
