@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.main import app
-from pneumo_ros.gap.diagnose import Options, held_out
+from pneumo_ros.gap.diagnose import Options
 from pneumo_ros.gap.run import diagnose_files, prepared
+from pneumo_ros.gap.runs import held_out
 from pneumo_ros.rig import load_rig
 
 

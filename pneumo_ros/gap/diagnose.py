@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.gap.ambiguity import ambiguity_group
-from pneumo_ros.gap.compete import Contest, Effort, Progress, compete, with_jacobian
-from pneumo_ros.gap.diagnosis import Diagnosis, EditTest, Experiment, Gap, Ranked
+from pneumo_ros.gap.compete import Contest, Effort, Progress, compete
+from pneumo_ros.gap.diagnosis import Diagnosis, Experiment, Gap
 from pneumo_ros.gap.fit import Fit, fit, sensitivities
-from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, noise_floor, settle, total_gap
+from pneumo_ros.gap.held_out import noise_floor, settle, total_gap
 from pneumo_ros.gap.model import Active, Array, Mask, Model
 from pneumo_ros.gap.places import effect_shares
-from pneumo_ros.gap.problem import Candidate, Problem
+from pneumo_ros.gap.problem import Problem
+from pneumo_ros.gap.ranking import rank
+from pneumo_ros.gap.runs import HeldOut, edit_test, held_runs
 from pneumo_ros.gap.selection import Scored, Thresholds, null_thresholds, score, select
-from pneumo_ros.gap.uncertainty import covariance, effect_estimates, nuisance_estimates
+from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 
 
@@ -71,15 +73,6 @@ class Options:
     experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """A structure on the held-out log."""
-
-    predicted: Array
-    channels: Array
-    total: float
-
-
 def diagnose(
     model: Model,
     fit_logs: Sequence[Any],
@@ -110,7 +103,7 @@ def diagnose(
     everything = np.ones(len(problem.measured), dtype=bool)
     base = _final(problem, contest.refit, everything)
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
-    runs = _runs(problem, base, best, holdout)
+    runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
     places = _whereabouts(problem, base, best, holdout, options)
     opinion = judge(refit, finalists, chosen, options.calibration, _on_held_out(runs, holdout, places))
@@ -141,13 +134,6 @@ def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
     return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
 
 
-def held_out(model: Model, record: Any, nuisance: Array, active: Sequence[Active]) -> HeldOut:
-    """Prediction and gaps of a structure on a record from its measured initial state."""
-    predicted = free_run(model, record, nuisance, active)
-    channels = channel_gaps(record, predicted)
-    return HeldOut(predicted, channels, total_gap(channels))
-
-
 def _report(
     problem: Problem,
     contest: Contest,
@@ -166,7 +152,7 @@ def _report(
 ) -> Diagnosis:
     model = problem.model
     tell(0.95, "ranking")
-    ranking = _ranking(problem, opinion, refit, finalists, base, best, runs, holdout)
+    ranking = rank(problem, opinion, refit, finalists, base, best, runs, holdout)
     group = ambiguity_group(problem, opinion, finalists, options.limits)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
     before, after = places
@@ -206,18 +192,6 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
     return sensitivities(problem, again)
 
 
-def _held(problem: Problem, one: Fit, holdout: Any) -> HeldOut:
-    active = problem.active(one.candidate, problem.values(one.candidate, one.x))
-    return held_out(problem.model, holdout, problem.nuisance(one.x), active)
-
-
-def _runs(problem: Problem, base: Fit, best: Fit, holdout: Any) -> dict[str, HeldOut]:
-    """Nominal, re-estimated and best structure on the held-out log."""
-    nominal_values = np.array([p.nominal for p in problem.model.parameters])
-    runs = {"nominal": held_out(problem.model, holdout, nominal_values, ()), "refit": _held(problem, base, holdout)}
-    return runs | {"best": runs["refit"] if best is base else _held(problem, best, holdout)}
-
-
 def _on_held_out(
     runs: Mapping[str, HeldOut], holdout: Any, places: tuple[Whereabouts | None, Whereabouts | None]
 ) -> HeldOutGaps:
@@ -234,67 +208,6 @@ def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
     per_channel = {c: {name: float(v[k]) for name, v in table.items()} for k, c in enumerate(model.channels)}
     totals = {name: run.total for name, run in runs.items()}
     return Gap(totals["nominal"], totals["refit"], totals["best"], total_gap(floor), per_channel)
-
-
-def _ranking(
-    problem: Problem,
-    opinion: Opinion,
-    nominal: Scored,
-    finalists: Sequence[Scored],
-    base: Fit,
-    best: Fit,
-    runs: Mapping[str, HeldOut],
-    holdout: Any,
-) -> list[Ranked]:
-    refit = runs["refit"]
-    fitted = problem.gap(base.residual)
-    out = [replace(_plain(("none",), opinion.named[Candidate()], refit.total, fitted), evidence=_weighed(nominal))]
-    if opinion.unknown > 1e-3:
-        out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
-    for scored in finalists:
-        same = best is not base and scored.fit.candidate == best.candidate
-        one = best if same else with_jacobian(problem, scored.fit)
-        run = runs["best"] if same else _held(problem, one, holdout)
-        ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
-        out.append(replace(ranked, evidence=_weighed(scored)))
-    return sorted(out, key=lambda r: -r.probability)
-
-
-def _weighed(one: Scored) -> dict[str, float]:
-    return {"level": one.level, "cost": one.fit.cost, "stretch": one.stretch}
-
-
-def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: float) -> Ranked:
-    return Ranked(effects, (), None, probability, {}, gap, 0.0, (0.0, 0.0), fitted)
-
-
-def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Any) -> Ranked:
-    parts = one.candidate.parts
-    estimates = effect_estimates(problem, one, covariance(problem, one))
-    notes = [f"{name} ended at its bound" for name, e in estimates.items() if e.at_bound]
-    notes += [f"{name} moves no output" for name, e in estimates.items() if e.moves_nothing]
-    if not np.all(np.isfinite(run.predicted)):
-        notes.append("unstable on the held-out log")
-    return Ranked(
-        effects=tuple(effect for effect, _ in parts),
-        sites=tuple(site for _, site in parts),
-        side=side_of(problem.model, one.candidate),
-        probability=probability,
-        parameters=estimates,
-        gap_after=run.total,
-        shrink=1.0 - run.total / refit.total,
-        shrink_ci90=bootstrap_shrink(holdout, refit.predicted, run.predicted),
-        gap_fit=problem.gap(one.residual),
-        notes=tuple(notes),
-    )
-
-
-def side_of(model: Model, candidate: Candidate) -> str | None:
-    """The side its effects share; both when they are at different ends; None where no effect has one."""
-    sides = {model.side(Active(effect, site, ())) for effect, site in candidate.parts} - {None}
-    if not sides:
-        return None
-    return sides.pop() if len(sides) == 1 else "both"
 
 
 def _whereabouts(
@@ -379,24 +292,3 @@ def _hidden(problem: Problem, contest: Contest) -> dict[str, str]:
 def _trajectories(holdout: Any, runs: Mapping[str, HeldOut]) -> dict[str, Array]:
     time = np.arange(len(holdout.measured)) * holdout.period
     return {"time": time, "log": np.asarray(holdout.measured), **{name: run.predicted for name, run in runs.items()}}
-
-
-def edit_test(problem: Problem, edit: Any, base: Fit, best: Fit) -> EditTest:
-    """Predict a log of the rig after a known change: what the log's configuration states differently is applied to the
-    estimates as a factor; nothing is fitted again."""
-    model = problem.model
-    changes = getattr(model, "changes", None)
-    factors: dict[str, float] = {} if changes is None else changes(edit)
-    scale = np.array([factors.get(p.name, 1.0) for p in model.parameters])
-    nominal = np.array([p.nominal for p in model.parameters])
-    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
-    gaps = [
-        held_out(model, edit, nuisance * scale, effects).total
-        for nuisance, effects in (
-            (nominal, ()),
-            (problem.nuisance(base.x), ()),
-            (problem.nuisance(best.x), active),
-        )
-    ]
-    changed = {name: factor for name, factor in factors.items() if factor != 1.0}
-    return EditTest(edit.name, changed, *gaps)
