@@ -16,6 +16,7 @@ import numpy as np
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
+from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
 from pneumo_ros.gap.selection import FORM, Thresholds, noise_level, score
@@ -39,6 +40,7 @@ class Effort:
     blind_pairs : pairs taken from the screening at the refit
     pair_finalists : pairs fitted to convergence
     probes : second effects probed on each leader
+    exchanged : rivals probed in place of each effect of the best pair
     short, long : iterations of a short and of a full fit
     """
 
@@ -48,6 +50,7 @@ class Effort:
     blind_pairs: int = 3
     pair_finalists: int = 3
     probes: int = 24
+    exchanged: int = 6
     short: int = 3
     long: int = 8
 
@@ -175,7 +178,51 @@ def _run_pairs(contest: Contest) -> None:
     short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
     ended = [_finish(problem, one, effort, False) for one in short[: effort.pair_finalists]]
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+    _exchange_each(contest)
     _try_without_each(contest)
+
+
+def _exchange_each(contest: Contest) -> None:
+    """For each effect of the best pair, the likeliest other one of the same place: a lag has a delay as its rival, and
+    neither may win because the other was never tried beside the same second effect.
+    """
+    problem, effort = contest.problem, contest.effort
+    if not contest.pairs:
+        return
+    pair = contest.pairs[0]
+    for k, part in enumerate(pair.candidate.parts):
+        kept = pair.candidate.parts[1 - k]
+        alone = fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1)
+        rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible((kept, p))]
+        tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
+        promised = promises(problem, alone, trials(problem, alone, rivals))
+        fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
+        for short in _short_fits(contest, alone, _probed(problem, alone, fresh)[:1], (0.86, 0.88)):
+            contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort, False)])
+
+
+def _rivals(problem: Problem, part: Part, other: Part) -> bool:
+    """Whether two effects at the same site are blamed on the same place."""
+    if part[0] == other[0] or part[1] != other[1]:
+        return False
+    one, two = (problem.model.places(problem.active(Candidate((p,)), _typical(problem, p))[0]) for p in (part, other))
+    return one[:1] == two[:1]
+
+
+def _typical(problem: Problem, part: Part) -> Array:
+    return np.array([p.typical for p in problem.effect_parameters(Candidate((part,)))])
+
+
+def _alone(problem: Problem, pair: Fit, part: Part) -> tuple[Candidate, Array]:
+    """One effect of a pair, and the unknowns it has there."""
+    candidate, first = Candidate((part,)), 0
+    for one in pair.candidate.parts:
+        count = len(problem.effect_parameters(Candidate((one,))))
+        if one == part:
+            values = problem.values(pair.candidate, pair.x)[first : first + count].tolist()
+            return candidate, problem.start(candidate, pair.x[: problem.fixed], values)
+        first += count
+    raise AssertionError(f"{part} is no part of {pair.candidate.label}")
 
 
 def _try_without_each(contest: Contest) -> None:
@@ -183,15 +230,11 @@ def _try_without_each(contest: Contest) -> None:
     problem, pair = contest.problem, contest.pairs[0] if contest.pairs else None
     if pair is None:
         return
-    found, first = contest.finalists, 0
     for part in pair.candidate.parts:
-        candidate = Candidate((part,))
-        count = len(problem.effect_parameters(candidate))
-        values = problem.values(pair.candidate, pair.x)[first : first + count].tolist()
-        first += count
-        start = problem.start(candidate, contest.refit.x[: problem.fixed], values)
+        candidate, start = _alone(problem, pair, part)
+        start[: problem.fixed] = contest.refit.x[: problem.fixed]
         alone = fit(problem, candidate, start, contest.refit.jacobian, iterations=contest.effort.long)
-        before = min((f.cost for f in found if f.candidate == candidate), default=np.inf)
+        before = min((f.cost for f in contest.finalists if f.candidate == candidate), default=np.inf)
         if alone.cost < before - 1.0:
             rest = [f for f in contest.singles if f.candidate != candidate]
             contest.singles = _by_cost([alone, *rest[: contest.effort.finalists]]) + rest[contest.effort.finalists :]

@@ -19,7 +19,7 @@ from pneumo_ros.gap.problem import Problem
 from pneumo_ros.gap.ranking import rank
 from pneumo_ros.gap.runs import HeldOut, edit_test, held_runs
 from pneumo_ros.gap.selection import Scored, Thresholds, null_thresholds, score, select
-from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
+from pneumo_ros.gap.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 
 
@@ -106,7 +106,8 @@ def diagnose(
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
     places = _whereabouts(problem, base, best, holdout, options)
-    opinion = judge(refit, finalists, chosen, options.calibration, _on_held_out(runs, holdout, places))
+    held, walls = _on_held_out(runs, holdout, places), at_bounds(problem, chosen.fit)
+    opinion = judge(refit, finalists, chosen, options.calibration, held, walls)
     found = _report(
         problem, contest, opinion, refit, finalists, base, best, runs, places, holdout, options, tell, notes, edit
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from pneumo_ros.gap.diagnosis import Estimate
 from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.model import Array, Mask
+from pneumo_ros.gap.model import Array, EffectParameter, Mask
 from pneumo_ros.gap.problem import Problem
 
 LONGEST = 60  # fit samples over which the residual's correlation is summed
@@ -66,7 +66,7 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
         name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
         while name in out:
             name += "_2"
-        at_bound = not free[m] and not (p.size and p.low == 0.0 and fit.x[m] == 0.0)
+        at_bound = not free[m] and not _absent(p, fit.x[m])
         out[name] = Estimate(
             value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
         )
@@ -101,6 +101,18 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
         p.name: Estimate(float(values[m]), float(np.sqrt(cov[m, m]) * p.std), p.unit, not free[m])
         for m, p in enumerate(problem.model.parameters)
     }
+
+
+def at_bounds(problem: Problem, fit: Fit) -> int:
+    """How many parameters of its effects ended at an end of their allowed range."""
+    free, parameters = _free(problem, fit), problem.effect_parameters(fit.candidate)
+    return sum(not free[problem.fixed + k] and not _absent(p, fit.x[problem.fixed + k])
+               for k, p in enumerate(parameters))  # fmt: skip
+
+
+def _absent(parameter: EffectParameter, value: float) -> bool:
+    """A size that ended at zero: no effect, which is no wall."""
+    return parameter.size and parameter.low == 0.0 and value == 0.0
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:

@@ -33,6 +33,7 @@ class Calibration:
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     held : held-out gap over the noise floor that a right structure may leave (jitter, lost samples, jumps between rows)
     kept : share of the held-out equations' gap left by the best named structure at which "unknown" is as likely as it
+    walls : parameters at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
@@ -45,6 +46,7 @@ class Calibration:
     real: float = 2.5
     held: float = 1.5
     kept: float = 0.25
+    walls: float = 1.9
     held_real: float = 3.0
 
 
@@ -100,10 +102,14 @@ def judge(
     chosen: Scored,
     calibration: Calibration,
     held: HeldOutGaps,
+    walls: int = 0,
 ) -> Opinion:
-    """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection."""
+    """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection.
+
+    ``walls`` counts the chosen structure's parameters at a bound.
+    """
     named = _named(refit, finalists, chosen, calibration)
-    unknown = _unknown(refit, chosen, calibration, held)
+    unknown = _unknown(refit, chosen, calibration, held, walls)
     scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
     verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
     return Opinion(chosen, verdict, scaled, unknown)
@@ -127,7 +133,7 @@ def _named(
     return {c: w / total for c, w in weights.items()}
 
 
-def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: HeldOutGaps) -> float:
+def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: HeldOutGaps, walls: int) -> float:
     """Probability that what is left is the work of something without a name."""
     if chosen.size == 0:
         share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
@@ -138,6 +144,8 @@ def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: Held
         share = (max(np.sqrt(left), left_held) / calibration.leftover) ** calibration.steepness
         if held.kept is not None:
             share = max(share, (held.kept / calibration.kept) ** calibration.steepness)
+        # A law that is bent to the ends of what it can do stands in for another one.
+        share = max(share, (walls / calibration.walls) ** calibration.steepness)
     return float(share / (1.0 + share))
 
 

@@ -45,8 +45,8 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("hysteresis_force", "N", 0.0, 150.0, 8.0, size=True, starts=(2.0, 30.0)),
         EffectParameter("yield_travel", "m", 5e-4, 3e-2, 4e-3, starts=(1.5e-3,)),
-        EffectParameter("sharpness", "1", 1.0, 4.0, 1.5),
-        EffectParameter("unloading", "1", 0.0, 1.0, 0.5),
+        EffectParameter("sharpness", "1", 0.7, 4.0, 1.5),
+        EffectParameter("unloading", "1", -0.3, 1.3, 0.5),
     ),
     term=PlantTerm(states=1, advance=advance, force=force),
 )

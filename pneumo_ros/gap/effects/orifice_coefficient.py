@@ -37,7 +37,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("coefficient_error", "1", -0.7, 1.0, 0.08, size=True, starts=(-0.08,)),
         EffectParameter("ratio_slope", "1", -2.0, 2.0, 0.5, starts=(-0.5,)),
-        EffectParameter("outlet_share", "1", 0.0, 1.0, 0.5, starts=(0.0,)),
+        EffectParameter("outlet_share", "1", -0.2, 1.2, 0.5, starts=(0.0,)),
     ),
     term=PlantTerm(air=air),
 )
