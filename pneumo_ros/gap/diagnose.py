@@ -44,7 +44,7 @@ class Whereabouts:
 
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
-TELLING = 1.4  # null standard deviations that the equations must show of a gap before they judge a structure
+TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
