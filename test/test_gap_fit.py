@@ -114,6 +114,38 @@ def test_jumps_between_samples_are_timed(model: RigModel) -> None:
     assert np.mean(again.residual**2) < 0.5 * np.mean(best.residual**2)
 
 
+def test_jumps_that_a_wrong_structure_misplaced_are_put_back(model: RigModel) -> None:
+    """Jumps exactly where the log has them; a first timing has put some of them a sample early."""
+    road, commands = excitation(6.0, 1)
+    steps = np.repeat(np.random.default_rng(5).uniform(0.75, 1.25, (12, 2)), 250, axis=0)
+    commands[:, :2] = trim(model.rig).command[:2] * steps
+    inputs = driven(road, commands)
+    logged = Problem(model, (signals_of(model.simulate(inputs, initial=trim(model.rig).state), road, commands, 1),))
+    events = model.events(logged.records[0])
+    lead = np.random.default_rng(6).choice([0.0, 1.0], len(events))
+    wrong = Problem(model, (model.led(logged.records[0], events, lead),))
+    best = fit(wrong, Candidate(), wrong.start(Candidate(), None, ()), iterations=6)
+    again = timed(logged, wrong, best)
+    assert again is not wrong
+    left, before = (np.sqrt(np.mean((p.records[0].commands - logged.records[0].commands) ** 2)) for p in (again, wrong))
+    assert left < 0.4 * before
+
+
+def test_a_channel_at_half_the_rate_counts_where_it_was_sampled(model: RigModel) -> None:
+    record = log(model, 1)
+    weight = record.weight.copy()
+    weight[1::2, 4:] = 0.0
+    measured = record.measured.copy()
+    measured[1::2, 4:] += 1e4  # whatever fills the rows without a sample must not count
+    slower = Problem(model, (replace(record, measured=measured, weight=weight),))
+    whole = Problem(model, (record,))
+    assert (slower.weight[:, 4:] > 0.0).all() and np.allclose(slower.weight[:, :4], whole.weight[:, :4])
+    assert (slower.weight[:, 4:] < whole.weight[:, 4:]).all()  # fewer samples, more noise
+    start = whole.start(Candidate(), None, ())
+    here, there = (p.residual(Candidate(), start)[:, 4:] for p in (slower, whole))
+    assert np.sqrt(np.mean(here**2)) == pytest.approx(np.sqrt(np.mean(there**2)), rel=0.25)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("truth", "verdict", "side", "place"),

@@ -1,0 +1,63 @@
+"""From scores to a verdict: what makes an effect accepted, unknown, or nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pneumo_ros.gap.fit import Fit
+from pneumo_ros.gap.problem import Candidate
+from pneumo_ros.gap.selection import Scored, Thresholds, select
+from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge
+
+CALM = HeldOutGaps(1.1, 1.1)
+LIMITS = Thresholds()
+
+
+def scored(level: float, cost: float, *effects: str, unknowns: int = 30) -> Scored:
+    candidate = Candidate(tuple((name, "front") for name in effects))
+    blocks = level * np.array([0.9, 1.0, 1.1, 1.0])
+    return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0)
+
+
+def opinion(refit: Scored, *others: Scored, held: HeldOutGaps = CALM, walls: int = 0) -> Opinion:
+    chosen = select(refit, others, LIMITS)
+    return judge(refit, others, chosen, Calibration(), held, walls)
+
+
+def test_what_chance_wins_is_none() -> None:
+    found = opinion(scored(0.20, -900.0), scored(0.17, -970.0, "tyre_damping", unknowns=31))
+    assert found.verdict == "none" and found.probability > 0.9
+
+
+def test_a_small_effect_that_costs_far_more_than_chance_is_named() -> None:
+    found = opinion(scored(0.46, -760.0), scored(0.17, -1160.0, "leak", unknowns=32), held=HeldOutGaps(1.6, 1.0))
+    assert found.verdict == "leak" and found.probability > 0.9
+
+
+def test_two_names_that_fit_alike_share_the_probability() -> None:
+    rivals = scored(0.16, -1150.0, "valve_lag", unknowns=32), scored(0.16, -1146.0, "transport_delay", unknowns=31)
+    found = opinion(scored(17.0, 1200.0), *rivals, held=HeldOutGaps(8.0, 1.1))
+    assert {found.verdict} <= {"valve_lag", "transport_delay"} and 0.4 < found.probability < 0.65
+
+
+@pytest.mark.parametrize(
+    ("level", "held", "walls"),
+    [
+        (120.0, HeldOutGaps(20.0, 1.1), 0),  # the blocks kept from the fit
+        (0.6, HeldOutGaps(20.0, 12.0), 0),  # the held-out free run: the name mimicked the fitted log only
+        (0.6, HeldOutGaps(20.0, 1.1, kept=0.6), 0),  # the held-out equations
+        (0.6, HeldOutGaps(20.0, 1.1), 3),  # a law bent to its ends
+    ],
+)
+def test_any_measure_of_a_wrong_name_makes_it_unknown(level: float, held: HeldOutGaps, walls: int) -> None:
+    structures = scored(400.0, 3000.0), scored(level, -500.0, "bellows_mode", unknowns=33)
+    assert opinion(*structures, held=held, walls=walls).verdict == "unknown"
+    calm = opinion(structures[0], replace(structures[1], level=0.6), held=HeldOutGaps(20.0, 1.1))
+    assert calm.verdict == "bellows_mode" and calm.unknown < 0.05
+
+
+def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:
+    assert opinion(scored(0.2, -900.0), held=HeldOutGaps(15.0, 15.0)).verdict == "unknown"
