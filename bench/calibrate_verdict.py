@@ -55,12 +55,18 @@ def unknown_share(found: dict[str, Any], constants: Calibration) -> float:
     return float(np.clip(ratio / (1.0 + ratio), 1e-3, 1.0 - 1e-3))
 
 
+def height(weighed: dict[str, float], entry: dict[str, Any], constants: Calibration) -> float:
+    """Logarithm of a structure's weight before its effects pay their toll."""
+    fitted = [name for name in entry["parameters"] if "total_lag" not in name]  # that one follows from the others
+    return -constants.sharpness * (weighed["cost"] + TOLL * len(fitted)) / weighed["samples"]
+
+
 def named_share(label: dict[str, Any], found: dict[str, Any], constants: Calibration) -> float:
     """Probability that the ranking gives the true structure, were the effect surely in the library."""
     tolls = (0.0, constants.first_toll, constants.first_toll + constants.second_toll)
     entries = [entry for entry in found["ranking"] if entry.get("evidence")]
     sizes = [0 if entry["effects"] == ["none"] else len(entry["effects"]) for entry in entries]
-    heights = np.array([-constants.sharpness * (entry["evidence"]["cost"] + TOLL * len(entry["parameters"])) - tolls[n]
+    heights = np.array([height(entry["evidence"], entry, constants) - tolls[n]
                         for entry, n in zip(entries, sizes, strict=True)])  # fmt: skip
     weights = np.exp(heights - heights.max())
     true = np.array(["+".join(sorted(set(entry["effects"]))) == truth(label) for entry in entries])
@@ -97,7 +103,7 @@ def main() -> None:
     known = [case for case, out in zip(cases, foreign, strict=True) if not out]
     loss = []
     for sharpness, first, second in product(
-        (0.01, 0.02, 0.04, 0.06, 0.1, 0.2), (5.0, 7.0, 9.0, 12.0), (5.0, 9.0, 14.0)
+        (6.0, 12.0, 24.0, 36.0, 60.0, 120.0), (5.0, 7.0, 9.0, 12.0), (5.0, 9.0, 14.0)
     ):
         c = replace(Calibration(), sharpness=sharpness, first_toll=first, second_toll=second)
         share = [named_share(*case, c) for case in known]

@@ -55,7 +55,7 @@ class Ranked:
     shrink_ci90 : moving-block bootstrap
     gap_fit : gap on the fitted logs
     evidence : what its probability rests on: mean square on the selection blocks, training cost, squared stretch of the
-        tolerances
+        tolerances, effective samples
     notes : what counts against it
     """
 

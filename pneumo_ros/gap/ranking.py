@@ -46,7 +46,7 @@ def rank(
 
 
 def _weighed(one: Scored) -> dict[str, float]:
-    return {"level": one.level, "cost": one.fit.cost, "stretch": one.stretch}
+    return {"level": one.level, "cost": one.fit.cost, "stretch": one.stretch, "samples": one.samples}
 
 
 def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: float) -> Ranked:

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pneumo_ros.gap.fit import Fit
+from pneumo_ros.gap.fit import CORRELATION, Fit
 from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 from pneumo_ros.paths import share_file
@@ -31,7 +31,8 @@ class Thresholds:
     Attributes
     ----------
     first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
-    first_cost, second_cost : fall of the training cost that it must bring
+    first_cost, second_cost : fall of the training cost that it must bring in any case
+    first_share, second_share : the same for each effective sample, a fall of the log mean square of the fitted data
     least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
@@ -39,8 +40,10 @@ class Thresholds:
 
     first: float = 0.1
     second: float = 0.3
-    first_cost: float = 130.0
-    second_cost: float = 150.0
+    first_cost: float = 15.0
+    second_cost: float = 20.0
+    first_share: float = 0.2
+    second_share: float = 0.25
     least: float = 0.06
     model_form: float = 0.05
 
@@ -79,12 +82,14 @@ class Scored:
     level : mean square, sigmas
     blocks : (B,) mean square of each selection block
     stretch : sum of squares of the nuisance parameters, in prior sigmas
+    samples : effective number of fitted samples, what the training cost grows with
     """
 
     fit: Fit
     level: float
     blocks: Array
     stretch: float
+    samples: float = 600.0
 
     @property
     def size(self) -> int:
@@ -101,7 +106,9 @@ def score(problem: Problem, fit: Fit) -> Scored:
         rows = problem.block == number
         blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
     values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
-    return Scored(fit, float(np.mean(values)), values, float(np.sum(fit.x[: len(problem.model.parameters)] ** 2)))
+    stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
+    samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / CORRELATION
+    return Scored(fit, float(np.mean(values)), values, stretch, float(samples))
 
 
 def noise_level(problem: Problem) -> float:
@@ -126,7 +133,11 @@ def standard_error(one: Scored, other: Scored) -> float:
 def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Scored:
     """The chosen structure; the refit itself when nothing beats it by enough."""
     chosen = refit
-    for size, gain, cost in ((1, limits.first, limits.first_cost), (2, limits.second, limits.second_cost)):
+    wanted = (
+        (1, limits.first, max(limits.first_cost, limits.first_share * refit.samples)),
+        (2, limits.second, max(limits.second_cost, limits.second_share * refit.samples)),
+    )
+    for size, gain, cost in wanted:
         rivals = [f for f in finalists if f.size == size]
         if not rivals:
             continue

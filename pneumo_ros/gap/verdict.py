@@ -24,8 +24,8 @@ class Calibration:
 
     Attributes
     ----------
-    sharpness : fall of log probability per unit of training cost (which takes ten fit samples for one and is therefore
-        far too sure of itself where laws differ)
+    sharpness : fall of log probability per unit of log mean square of the fitted data: as many samples' worth of
+        evidence, however long the log, because laws differ by more than chance does
     first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
     leftover : share of the refit's misfit (rms) left by the best named structure at which "unknown" is as likely as it
     steepness : exponent of that transition
@@ -37,7 +37,7 @@ class Calibration:
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
-    sharpness: float = 0.06
+    sharpness: float = 36.0
     first_toll: float = 9.0
     second_toll: float = 9.0
     leftover: float = 0.18
@@ -122,7 +122,7 @@ def _named(
     tolls = (0.0, calibration.first_toll, calibration.first_toll + calibration.second_toll)
 
     def height(s: Scored) -> float:
-        return -calibration.sharpness * (s.fit.cost + TOLL * len(s.fit.x)) - tolls[min(s.size, 2)]
+        return -calibration.sharpness * (s.fit.cost + TOLL * len(s.fit.x)) / s.samples - tolls[min(s.size, 2)]
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())
