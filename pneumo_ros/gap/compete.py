@@ -193,6 +193,8 @@ def _exchange_each(contest: Contest) -> None:
     for k, part in enumerate(pair.candidate.parts):
         kept = pair.candidate.parts[1 - k]
         alone = fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1)
+        if alone.jacobian is None:  # it diverges without the other effect
+            continue
         rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible((kept, p))]
         tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
         promised = promises(problem, alone, trials(problem, alone, rivals))
