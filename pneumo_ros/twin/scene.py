@@ -146,7 +146,7 @@ def _sampled(
     shift[0] = 0.0
     stamps = time[:, None] + shift
     sensors = done.measured
-    if scene.jitter > 0.0:
+    if scene.jitter > 0.0 and np.isfinite(sensors).all():  # a rig that ran away is told by what it leaves
         clean = CubicSpline(time, done.measured - noise)
         moved = np.hstack([clean(np.minimum(stamps[:, 0], time[-1]))[:, :4],
                            clean(np.minimum(stamps[:, 1], time[-1]))[:, 4:]])  # fmt: skip
