@@ -87,7 +87,7 @@ def made(case: Planned, folder: Path, labels: Path) -> Path:
 def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
     """Label, the three sessions and what the config of each says.
 
-    A draw in which an effect hardly acts (a wheel that cannot lift before the rig leaves its range), or in which the rig
+    A draw in which an effect hardly acts (a wheel that cannot lift before the rig leaves its range), or the rig
     runs away, is drawn anew: a label must not name what is not there.
     """
     for draw in range(DRAWS):
