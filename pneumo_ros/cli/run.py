@@ -268,7 +268,8 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
     length = float(values[rig_node]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # both end the session in order
+        for number in (signal.SIGINT, signal.SIGTERM):  # set both: a background job inherits an ignored SIGINT
+            signal.signal(number, signal.default_int_handler)  # either ends the session in order
         supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
         try:
             with supervisor:
