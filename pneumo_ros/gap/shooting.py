@@ -16,7 +16,6 @@ from pneumo_ros.gap.model import Array, Record
 from pneumo_ros.gap.problem import BLOCK, SELECT_EVERY, Candidate, Problem
 
 WINDOWS = 2  # in a time block
-ITERATIONS = 6
 ASTRAY = 1.0  # normalised gap of a free run that is worse than the log's own mean
 
 
