@@ -28,7 +28,7 @@ from scipy.signal import savgol_filter
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import Active, EffectParameter, Parameter
+from pneumo_ros.gap.model import Active, EffectParameter, Parameter, PlainEffect
 from pneumo_ros.gap.verdict import Calibration
 
 Array = NDArray[np.float64]
@@ -48,27 +48,18 @@ PARAMETERS = (
 )
 
 
-@dataclass(frozen=True)
-class Law:
-    """Something that may act on the floor, and on what it acts: the site is what it pulls against."""
-
-    id: str
-    sites: tuple[str, ...]
-    parameters: tuple[EffectParameter, ...]
-
-
-EFFECTS: Mapping[str, Law] = {
+EFFECTS: Mapping[str, PlainEffect] = {
     law.id: law
     for law in (
-        Law("coulomb_friction", ("ground", "base"),
+        PlainEffect("coulomb_friction", ("ground", "base"),
             (EffectParameter("friction_force", "N", 0.0, 20.0, 1.0, size=True, starts=(0.3, 3.0)),)),
-        Law("viscous_damping", ("ground", "base"),
+        PlainEffect("viscous_damping", ("ground", "base"),
             (EffectParameter("damping", "N s/m", 0.0, 200.0, 5.0, size=True),)),
-        Law("spring", ("ground", "base"),
+        PlainEffect("spring", ("ground", "base"),
             (EffectParameter("stiffness", "N/m", -800.0, 2000.0, 100.0, size=True),)),
-        Law("hardening", ("base",),
+        PlainEffect("hardening", ("base",),
             (EffectParameter("cubic_stiffness", "N/m3", -5e8, 5e8, 2e7, size=True),)),
-        Law("sensor_scale", ("floor",), (EffectParameter("scale_error", "1", -0.6, 0.6, 0.05, size=True),)),
+        PlainEffect("sensor_scale", ("floor",), (EffectParameter("scale_error", "1", -0.6, 0.6, 0.05, size=True),)),
     )
 }  # fmt: skip
 ORDER = [(name, site) for name, law in EFFECTS.items() for site in law.sites if name != "sensor_scale"]
@@ -113,7 +104,7 @@ class Frame:
 
     channels: tuple[str, ...] = ("floor",)
     parameters: tuple[Parameter, ...] = PARAMETERS
-    effects: Mapping[str, Law] = field(default_factory=lambda: EFFECTS)
+    effects: Mapping[str, PlainEffect] = field(default_factory=lambda: EFFECTS)
 
     def initial(self, record: FrameRecord, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         """Displacement and velocity at the first row, from a parabola through the first 40 ms."""

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import Active, EffectParameter, Parameter
+from pneumo_ros.gap.model import Active, EffectParameter, Parameter, PlainEffect
 from pneumo_ros.gap.problem import AVERAGED, REACH
 from pneumo_ros.gap.selection import Thresholds
 from pneumo_ros.gap.verdict import Calibration
@@ -49,23 +49,16 @@ REAL = Calibration(leftover=0.4)
 PARAMETERS = (Parameter("seepage", "1/s", 0.0, TIGHT / HOLD / REACH),)
 
 
-@dataclass(frozen=True)
-class Law:
-    """A way in which the pressure may fall."""
-
-    id: str
-    sites: tuple[str, ...]
-    parameters: tuple[EffectParameter, ...]
-
-
-EFFECTS: Mapping[str, Law] = {
+EFFECTS: Mapping[str, PlainEffect] = {
     law.id: law
     for law in (
         # Choked outflow from a fixed volume: the pressure falls in proportion to itself.
-        Law("leak", ("chamber",), (EffectParameter("rate", "1/s", 0.0, 0.05, 1e-4, size=True, starts=(1e-5, 1e-3)),)),
+        PlainEffect("leak", ("chamber",), (
+            EffectParameter("rate", "1/s", 0.0, 0.05, 1e-4, size=True, starts=(1e-5, 1e-3)),
+        )),
         # Air heated by filling cools down to the wall: a fall that ends. Conduction alone, across 1 cm of air at 8 bar,
         # takes 4 s (L^2 / (pi^2 a), a = 2.7e-6 m2/s); convection is quicker.
-        Law("cooling", ("chamber",), (
+        PlainEffect("cooling", ("chamber",), (
             EffectParameter("warmth", "1", 0.0, 0.1, 3e-3, size=True),
             EffectParameter("time_constant", "s", 0.5, 10.0, 4.0, starts=(1.0, 8.0)),
         )),
@@ -111,7 +104,7 @@ class Chamber:
 
     channels: tuple[str, ...] = ("pressure",)
     parameters: tuple[Parameter, ...] = PARAMETERS
-    effects: Mapping[str, Law] = field(default_factory=lambda: EFFECTS)
+    effects: Mapping[str, PlainEffect] = field(default_factory=lambda: EFFECTS)
 
     def initial(self, record: ChamberRecord, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         """Pressure over the first five seconds and how well their mean is known, Pa."""

@@ -80,6 +80,15 @@ class EffectLike(Protocol):
 
 
 @dataclass(frozen=True)
+class PlainEffect:
+    """An effect of a rig whose model knows by itself what to do with it: name, where it may act, parameters."""
+
+    id: str
+    sites: tuple[str, ...]
+    parameters: tuple[EffectParameter, ...]
+
+
+@dataclass(frozen=True)
 class Active:
     """An effect at a site with values of its parameters (in their order)."""
 
