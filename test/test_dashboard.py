@@ -40,7 +40,6 @@ from pneumo_ros.session.reading import read_log
 
 pytestmark = pytest.mark.realtime
 
-TOKEN = generate_jwt_token(generate_session_id())
 URL = re.compile(r"http://\S+")
 
 
@@ -137,7 +136,9 @@ def greeted(url: str, origin: str, cookie: str = "") -> bool:
     async def connect() -> bool:
         headers = {"Origin": origin, **({"Cookie": cookie} if cookie else {})}
         address = url.replace("http", "ws", 1).rstrip("/") + "/ws"
-        socket = await websocket_connect(HTTPRequest(address, headers=headers), subprotocols=["bokeh", TOKEN])
+        # Bokeh's tokens hold for five minutes from their making, less than the suite takes.
+        token = generate_jwt_token(generate_session_id())
+        socket = await websocket_connect(HTTPRequest(address, headers=headers), subprotocols=["bokeh", token])
         return await asyncio.wait_for(socket.read_message(), 10) is not None
 
     try:
