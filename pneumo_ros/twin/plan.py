@@ -59,6 +59,7 @@ SETS: dict[str, Mix] = {
     "dev": Mix(1, none=16, single=25, pair=9, unknown=7, withheld=3, decoys=3),
     "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),
     "dev3": Mix(3, none=8, single=72, pair=20, unknown=14, withheld=8, decoys=4),
+    "dev4": Mix(4, none=10, single=150, pair=12, unknown=14, withheld=24, decoys=6),
 }
 # Six cases for every change of the code: their sizes are fixed, so that making one is three simulations.
 CI: tuple[Planned, ...] = (
