@@ -60,6 +60,7 @@ SETS: dict[str, Mix] = {
     "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),
     "dev3": Mix(3, none=8, single=72, pair=20, unknown=14, withheld=8, decoys=4),
     "dev4": Mix(4, none=10, single=150, pair=12, unknown=14, withheld=24, decoys=6),
+    "dev5": Mix(5, none=48, single=0, pair=0, unknown=0, withheld=0, decoys=0),
 }
 # Six cases for every change of the code: their sizes are fixed, so that making one is three simulations.
 CI: tuple[Planned, ...] = (
