@@ -93,8 +93,8 @@ def test_a_correction_at_a_place_is_that_force(model: RigModel, record: Signals)
 
 DISSIPATING = {
     "coulomb_friction": (6.0, 2e-4, 0.25),
-    "viscous_damping": (25.0,),
-    "bellows_hysteresis": (8.0, 1e-3),
+    "viscous_damping": (25.0, 0.0),
+    "bellows_hysteresis": (8.0, 1e-3, 1.0, 0.5),
     "tyre_damping": (20.0,),
 }
 

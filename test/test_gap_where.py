@@ -220,7 +220,7 @@ def test_a_wrong_structure_keeps_the_gap_and_the_right_one_does_not(model: RigMo
     nominal = np.array([p.nominal for p in model.parameters])
     before = locate(model, [fit], holdout)
     right = flexible_gain(model, [fit], holdout, nominal, friction, before)
-    damping = (Active("viscous_damping", "rear", (40.0,)),)
+    damping = (Active("viscous_damping", "rear", (40.0, 0.0)),)
     wrong = flexible_gain(model, [fit], holdout, nominal, damping, before)
     assert right.kept < 0.05 and right.log_ratio == pytest.approx(0.0, abs=0.1) and right.places == ()
     assert wrong.kept > 0.3 and wrong.log_ratio > 1.0 and wrong.places == ("rear_force",)

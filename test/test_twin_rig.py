@@ -147,7 +147,7 @@ def test_the_saved_rig_is_the_fitted_structure(record: Signals, tmp_path: Path) 
         typical("coulomb_friction", "front"), typical("pressure_lag", "both"),
     )  # fmt: skip
     saved = load_rig(save_corrected_rig(found_in(model, nuisance, *active), model, tmp_path / "rig.yaml"))
-    assert [one.effect for one in saved.effects] == ["valve_lag", "coulomb_friction", "pressure_lag"]
+    assert [one.effect for one in saved.effects] == ["viscous_damping", "valve_lag", "coulomb_friction", "pressure_lag"]
     assert saved.sprung_mass.value == pytest.approx(nuisance[0] + active[0].values[0])
     assert saved.outlet_area_front == NOMINAL.outlet_area_front
     start = trim(NOMINAL).state
@@ -203,7 +203,7 @@ def test_truth_holds_what_the_effects_do(record: Signals) -> None:
 
 def test_a_rig_that_runs_away_says_so(record: Signals) -> None:
     twin = diagnosed_rig(with_effects(NamedEffect("bellows_mode", "both", (
-        ("mode_mass", 2.0), ("mode_frequency", 3.0), ("mode_damping_ratio", 0.01)))), record.period)  # fmt: skip
+        ("mode_mass", 2.0), ("mode_frequency", 3.0), ("mode_damping_ratio", 0.01), ("wall_share", 0.0)))), record.period)  # fmt: skip
     with pytest.raises(PneumoError, match=r"ran away.*bellows_mode"):
         stepped(twin, replace(record, road=1e3 * record.road))
 

@@ -17,12 +17,13 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
 from pneumo_ros.gap.model import Array
-from pneumo_ros.gap.problem import Candidate, Part, Problem
+from pneumo_ros.gap.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
 from pneumo_ros.gap.selection import FORM, Thresholds, noise_level, score
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 
 PROBE = 3  # steps of a probe
+LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
 NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
@@ -101,6 +102,7 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
         raise InputError("the nominal model runs away on these logs, whatever its tolerances",
                          where=", ".join(r.name for r in problem.records),
                          remedy="check rig values, units and signs of command and road")  # fmt: skip
+    problem, refit = _in_turn(problem, refit)
     contest = Contest(problem, problem, refit, effort, progress)
     _time_jumps(contest)
     _run_singles(contest)
@@ -109,6 +111,23 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
         _run_pairs(contest)
         _time_jumps(contest)
     return contest
+
+
+def _in_turn(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
+    """The problem with those blocks kept from the fit that hold about their share of what the nominal model leaves.
+
+    A stop that is hit once, or a wheel that leaves the ground once, may lie in the kept blocks alone, where nothing can
+    be fitted to it.
+    """
+    squares = np.where(problem.weight > 0.0, refit.residual**2, 0.0).sum(axis=1)
+    shares = [squares[problem.block % SELECT_EVERY == turn].sum() / squares.sum() for turn in range(SELECT_EVERY)]
+    if LOPSIDED[0] <= shares[problem.turn] <= LOPSIDED[1]:
+        return problem, refit
+    turn = int(np.argmin(np.abs(np.array(shares) - 1.0 / SELECT_EVERY)))
+    if turn == problem.turn:
+        return problem, refit
+    problem = replace(problem, turn=turn)
+    return problem, fit(problem, refit.candidate, refit.x, refit.jacobian, iterations=15)
 
 
 def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:

@@ -61,7 +61,7 @@ def timed(logged: Problem, current: Problem, best: Fit) -> Problem:
     lead, x = _leads(logged, replace(best, residual=logged.residual(best.candidate, best.x)), listed)
     split = np.split(lead, np.cumsum([len(events) for events in listed])[:-1])
     records = tuple(model.led(r, e, x) for r, e, x in zip(logged.records, listed, split, strict=True))
-    moved = Problem(model, records, logged.averaged)
+    moved = replace(logged, records=records)
     after = fit(moved, best.candidate, x, best.jacobian, iterations=3)
     return moved if np.mean(after.residual[rows] ** 2) < WORTH * np.mean(best.residual[rows] ** 2) else current
 
@@ -75,7 +75,7 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
         for event in events:
             records = list(problem.records)
             records[k] = model.led(records[k], [event], np.ones(1))
-            one = Problem(model, tuple(records), problem.averaged)
+            one = replace(problem, records=tuple(records))
             # Measurements and weights stay: only the prediction of this log moves.
             columns.append(
                 ((problem.measured - one.predict(best.candidate, best.x)) * problem.weight - best.residual).ravel()

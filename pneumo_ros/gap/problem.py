@@ -22,7 +22,7 @@ COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
 REACH = 3.0  # prior sigmas that a nuisance parameter may move
 INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
 BLOCK = 1.25  # s, length of a time block
-SELECT_EVERY = 3  # every third block is kept from the fit and used for selection
+SELECT_EVERY = 3  # of so many blocks in turn, one is kept from the fit and used for selection
 
 Part = tuple[str, str]  # effect id, site
 
@@ -47,11 +47,14 @@ class Problem:
     ----------
     model : a :class:`~pneumo_ros.gap.model.Model`
     records : logs to fit
+    averaged : log samples in one fit sample
+    turn : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     """
 
     model: Model
     records: tuple[Any, ...]
     averaged: int = AVERAGED
+    turn: int = SELECT_EVERY - 1
     _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
@@ -126,7 +129,7 @@ class Problem:
     @cached_property
     def fitted(self) -> Mask:
         """(n,) samples that the fit sees; the others are for selection."""
-        return self.block % SELECT_EVERY != SELECT_EVERY - 1
+        return self.block % SELECT_EVERY != self.turn
 
     def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
         """Parameters of all its effects, in order."""

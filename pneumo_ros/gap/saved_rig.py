@@ -42,12 +42,12 @@ def corrected_rig(found: Diagnosis, model: RigModel, files: Sequence[Path] = ())
     own = {**dict(rig.ends), **{name: value for name, value in estimates.items() if name in END_LIMITS}}
     own |= {"reference_pressure_front": base.front.reference_pressure,
             "reference_pressure_rear": base.rear.reference_pressure}  # fmt: skip
-    rig, own, rest = _folded(rig, own, found.active)
+    rig, rest = _folded(rig, found.active)
     effects = (*rig.effects, *(_named(one, model.library, files) for one in rest))
     return replace(rig, ends=tuple(own.items()), effects=effects)
 
 
-def _folded(rig: Rig, own: dict[str, float], active: Sequence[Active]) -> tuple[Rig, dict[str, float], list[Active]]:
+def _folded(rig: Rig, active: Sequence[Active]) -> tuple[Rig, list[Active]]:
     """Effects that are a number of the rig become one; the others stay effects."""
     rest = []
     for one in active:
@@ -56,9 +56,7 @@ def _folded(rig: Rig, own: dict[str, float], active: Sequence[Active]) -> tuple[
             rest.append(one)
             continue
         rig = rig.with_values(**change)
-        if one.effect == "viscous_damping":
-            own = {k: v + one.values[0] if k.startswith("bushing_damping") else v for k, v in own.items()}
-    return rig, own, rest
+    return rig, rest
 
 
 def _numbers(rig: Rig, one: Active) -> dict[str, float]:
@@ -67,8 +65,6 @@ def _numbers(rig: Rig, one: Active) -> dict[str, float]:
         return {"sprung_mass": rig.sprung_mass.value + size}
     if one.effect == "cg_shift":
         return {"front_arm": rig.front_arm.value - size, "rear_arm": rig.rear_arm.value + size}
-    if one.effect == "viscous_damping" and one.site == "both":
-        return {"bushing_damping": rig.bushing_damping.value + size}
     return {}
 
 

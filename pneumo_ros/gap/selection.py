@@ -33,6 +33,8 @@ class Thresholds:
     first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
     first_cost, second_cost : fall of the training cost that it must bring in any case
     first_share, second_share : the same for each effective sample, a fall of the log mean square of the fitted data
+    alone : so many times the fall of the training cost is evidence for a first effect that the selection blocks neither
+        show nor deny
     least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
@@ -44,6 +46,7 @@ class Thresholds:
     second_cost: float = 20.0
     first_share: float = 0.2
     second_share: float = 0.25
+    alone: float = 2.5
     least: float = 0.06
     model_form: float = 0.05
 
@@ -144,9 +147,14 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         best = _simplest(rivals)
         poorer = chosen
         fallen = poorer.level - best.level
-        evidence = advantage(poorer, best) > gain and fallen > limits.least and poorer.fit.cost - best.fit.cost > cost
-        beyond_form = fallen > limits.model_form**2 * refit.level
-        if evidence and (size == 1 or beyond_form):
+        paid = poorer.fit.cost - best.fit.cost
+        shown = advantage(poorer, best) > gain and fallen > limits.least and paid > cost
+        if size == 1:
+            # A stop that is hit once lies in one block: where the kept blocks say nothing, the fit must say it by far.
+            evidence = shown or (paid > limits.alone * cost and fallen > -SAME * poorer.level)
+        else:
+            evidence = shown and fallen > limits.model_form**2 * refit.level
+        if evidence:
             chosen = best
     return chosen
 

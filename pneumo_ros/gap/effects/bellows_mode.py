@@ -1,7 +1,8 @@
 """A mode of the bellows itself: part of its mass moves against the height and answers near its own frequency.
 
-q'' = w^2 (h - q) + 2 zeta w (h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (h' - q')): far below w the
-bellows follow the height and no force is left but m h''.
+q'' = w^2 (h - q) + 2 zeta w ((1 - g) h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (1 - g) (h' - q')). The
+share g of the damping is the wall's own stretching, the rest acts between wall and strut: Lagrange's equations of the
+dissipation m zeta w ((1 - g) (h' - q')^2 + g q'^2). Far below w the bellows follow the height.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pneumo_ros.gap.kernel_parts import Air, Strut, Tyre
 from pneumo_ros.gap.model import EffectParameter
 
 State = tuple[float, float]
-Values = tuple[float, float, float]
+Values = tuple[float, float, float, float]
 
 
 @njit(cache=True, error_model="numpy")
@@ -30,20 +31,21 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     """Exact damped oscillation about the strut that moves at held speed."""
     w, zeta = 2.0 * math.pi * p[1], p[2]
     decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
+    behind = -2.0 * zeta * p[3] * strut.rate / w  # of the strut, at constant speed
     # The strut's position at the state's instant, half a step back: the staggered scheme's second order.
-    e0 = z[0] - (strut.height - 0.5 * dt * strut.rate)
+    e0 = z[0] - (strut.height - 0.5 * dt * strut.rate) - behind
     v0 = z[1] - strut.rate
     c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
     e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
     v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
-    return (e1 + strut.height + 0.5 * dt * strut.rate, v1 + strut.rate)
+    return (e1 + behind + strut.height + 0.5 * dt * strut.rate, v1 + strut.rate)
 
 
 @njit(cache=True, error_model="numpy")
 def force(strut: Strut, z: State, p: Values) -> float:
     """Inertia force of the mode on the strut."""
     w = 2.0 * math.pi * p[1]
-    return -p[0] * (w * w * (strut.height - z[0]) + 2.0 * p[2] * w * (strut.rate - z[1]))
+    return -p[0] * (w * w * (strut.height - z[0]) + 2.0 * p[2] * w * (1.0 - p[3]) * (strut.rate - z[1]))
 
 
 EFFECT = Effect(
@@ -55,6 +57,7 @@ EFFECT = Effect(
         EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True),
         EffectParameter("mode_frequency", "Hz", 3.0, 80.0, 20.0, starts=(10.0, 40.0)),
         EffectParameter("mode_damping_ratio", "1", 0.01, 0.5, 0.08),
+        EffectParameter("wall_share", "1", 0.0, 1.0, 0.5),
     ),
     term=PlantTerm(states=2, start=start, advance=advance, force=force),
 )

@@ -1,20 +1,22 @@
-"""The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8)."""
+"""The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8).
+
+-c (1 + b |v|) v: b is how much the constant grows, or falls, with speed.
+"""
 
 from __future__ import annotations
 
-from pneumo_ros.gap.effects.base import ENDS, Effect, Ends, Plant, Values
+from numba import njit
+
+from pneumo_ros.gap.compose import PlantTerm
+from pneumo_ros.gap.effects.base import ENDS, Effect
+from pneumo_ros.gap.kernel_parts import Strut
 from pneumo_ros.gap.model import EffectParameter
 
 
-def plant(plant: Plant, ends: Ends, values: Values) -> Plant:
-    """Adds to the viscous constant."""
-    body = plant.body
-    return plant._replace(
-        body=body._replace(
-            damping_front=body.damping_front + values[0] * ends.front,
-            damping_rear=body.damping_rear + values[0] * ends.rear,
-        )
-    )
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: tuple[float, ...], p: tuple[float, float]) -> float:
+    """Against the strut's rate."""
+    return -p[0] * (1.0 + p[1] * abs(strut.rate)) * strut.rate
 
 
 EFFECT = Effect(
@@ -22,6 +24,9 @@ EFFECT = Effect(
     summary="viscous damping of the strut beyond its tolerance",
     sites=ENDS,
     places=("{end}_force",),
-    parameters=(EffectParameter("added_damping", "N s/m", -60.0, 500.0, 25.0, size=True, starts=(-20.0,)),),
-    plant=plant,
+    parameters=(
+        EffectParameter("added_damping", "N s/m", -60.0, 500.0, 25.0, size=True, starts=(-20.0,)),
+        EffectParameter("growth_with_speed", "s/m", -2.0, 20.0, 0.5),
+    ),
+    term=PlantTerm(force=force),
 )
