@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.problem import Candidate
 from pneumo_ros.gap.selection import Scored, Thresholds, select
@@ -16,8 +17,8 @@ CALM = HeldOutGaps(1.1, 1.1)
 LIMITS = Thresholds()
 
 
-def scored(level: float, cost: float, *effects: str, unknowns: int = 30) -> Scored:
-    candidate = Candidate(tuple((name, "front") for name in effects))
+def scored(level: float, cost: float, *effects: str, unknowns: int = 30, site: str = "front") -> Scored:
+    candidate = Candidate(tuple((name, site) for name in effects))
     blocks = level * np.array([0.9, 1.0, 1.1, 1.0])
     return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0)
 
@@ -61,3 +62,33 @@ def test_any_measure_of_a_wrong_name_makes_it_unknown(level: float, held: HeldOu
 
 def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:
     assert opinion(scored(0.2, -900.0), held=HeldOutGaps(15.0, 15.0)).verdict == "unknown"
+
+
+def test_where_the_kept_blocks_say_nothing_the_fit_must_say_it_by_far() -> None:
+    """A stop that is hit once lies in the fitted blocks alone."""
+    refit = scored(0.20, -300.0)
+    assert opinion(refit, scored(0.20, -900.0, "bump_stop", unknowns=34)).verdict == "bump_stop"
+    assert opinion(refit, scored(0.20, -500.0, "bump_stop", unknowns=34)).verdict == "none"
+    assert opinion(refit, scored(0.25, -900.0, "bump_stop", unknowns=34)).verdict == "none"  # it spoils the others
+
+
+def test_the_group_holds_what_is_not_excluded() -> None:
+    """Beside none and unknown as well; the verdict itself first, the likeliest next."""
+    chosen = scored(0.2, -900.0)
+
+    def group(verdict: str, named: dict[tuple[str, ...], float]) -> tuple[str, ...]:
+        candidates = {scored(1.0, 0.0, *names).fit.candidate: p for names, p in named.items()}
+        return ambiguity_group(None, Opinion(chosen, verdict, candidates, 0.5), [])  # type: ignore[arg-type]
+
+    assert group("none", {(): 0.7, ("leak",): 0.1, ("dead_volume",): 0.16, ("payload",): 0.04}) == (
+        "dead_volume", "leak")  # fmt: skip
+    assert group("unknown", {("leak", "payload"): 0.2, ("leak",): 0.3}) == ("leak", "leak+payload")
+    assert group("leak", {(): 0.02, ("leak",): 0.9, ("heat_transfer",): 0.08}) == ("leak", "heat_transfer")
+
+
+def test_both_ends_are_claimed_only_where_both_were_seen() -> None:
+    """A stop that the front never reached in this log may still act there on another road."""
+    refit, rear = scored(19.0, 1200.0), scored(0.25, -780.0, "bump_stop", site="rear")
+    for cost, site in ((-780.0, "rear"), (-790.0, "both")):
+        both = scored(0.25, cost, "bump_stop", site="both")
+        assert select(refit, [both, rear], LIMITS).fit.candidate.parts == (("bump_stop", site),)

@@ -203,7 +203,8 @@ def test_truth_holds_what_the_effects_do(record: Signals) -> None:
 
 def test_a_rig_that_runs_away_says_so(record: Signals) -> None:
     twin = diagnosed_rig(with_effects(NamedEffect("bellows_mode", "both", (
-        ("mode_mass", 2.0), ("mode_frequency", 3.0), ("mode_damping_ratio", 0.01), ("wall_share", 0.0)))), record.period)  # fmt: skip
+        ("mode_mass", 2.0), ("mode_frequency", 3.0), ("mode_damping_ratio", 0.01), ("wall_share", 0.0),
+    ))), record.period)  # fmt: skip
     with pytest.raises(PneumoError, match=r"ran away.*bellows_mode"):
         stepped(twin, replace(record, road=1e3 * record.road))
 

@@ -120,8 +120,9 @@ def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: S
     if told:
         places = [f"{place_words(place)} {share:.0%}" for place, share in found.location if share >= SHARE_SHOWN]
         console.print("where: " + (", ".join(places) or "no place stands out"), highlight=False)
-    if len(found.ambiguity_group) > 1 and told:
-        console.print("not told apart by this log: " + ", ".join(found.ambiguity_group[1:]))
+    rivals = [name for name in found.ambiguity_group if name != found.verdict]
+    if rivals and told:
+        console.print("not told apart by this log: " + ", ".join(rivals))
     console.print(how_far(summary), highlight=False)
     if told:
         _show_ranking(console, found)

@@ -7,34 +7,39 @@ from collections.abc import Sequence
 import numpy as np
 
 from pneumo_ros.gap.problem import Problem
-from pneumo_ros.gap.selection import Scored, Thresholds, standard_error
+from pneumo_ros.gap.selection import Scored, standard_error
 from pneumo_ros.gap.verdict import Opinion, name_of
 
 SAME = 0.1  # relative difference of selection scores that is no difference
+POSSIBLE = 0.05  # probability from which an effect is not excluded
 ANGLE = 8.0  # degrees between the trajectories of two effects, nuisance parameters answered, below which they are alike
 
 
-def ambiguity_group(
-    problem: Problem, opinion: Opinion, finalists: Sequence[Scored], limits: Thresholds
-) -> tuple[str, ...]:
-    """Ids in the verdict's group, the verdict's first; empty for none and unknown.
+def ambiguity_group(problem: Problem, opinion: Opinion, finalists: Sequence[Scored]) -> tuple[str, ...]:
+    """Ids in the verdict's group, the verdict's own first ("none" and "unknown" have none).
 
     A rival belongs to it when its own best fit does nearly what the verdict's does: its trajectory is within
     :data:`ANGLE` of it (what it fails to explain, over what there was to explain) and the selection blocks do not tell
-    them apart (two standard errors, or :data:`SAME`).
+    them apart (two standard errors, or :data:`SAME`). So does every effect that is not improbable, the likeliest first:
+    beside "none" one that is barely too small to be accepted, beside "unknown" one that may be it under another law.
     """
-    if opinion.verdict in ("none", "unknown"):
-        return ()
+    names = [] if opinion.verdict in ("none", "unknown") else [opinion.verdict, *_alike(problem, opinion, finalists)]
+    possible = {name: p for name, p in opinion.effects.items() if p >= POSSIBLE and name not in names}
+    return (*names, *sorted(possible, key=lambda name: -possible[name]))
+
+
+def _alike(problem: Problem, opinion: Opinion, finalists: Sequence[Scored]) -> list[str]:
+    """Rivals of the same size that do what the verdict does."""
     chosen = opinion.chosen
-    names = [opinion.verdict]
+    names: list[str] = []
     for rival in finalists:
         name = name_of(rival.fit.candidate)
-        if name in names or rival.size != chosen.size:
+        if name in (opinion.verdict, *names) or rival.size != chosen.size:
             continue
         undecided = rival.level - chosen.level <= max(2.0 * standard_error(rival, chosen), SAME * chosen.level)
         if undecided and angle(problem, chosen, rival) < ANGLE:
             names.append(name)
-    return tuple(names)
+    return names
 
 
 def angle(problem: Problem, chosen: Scored, rival: Scored) -> float:

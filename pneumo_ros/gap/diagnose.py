@@ -154,12 +154,12 @@ def _report(
     model = problem.model
     tell(0.95, "ranking")
     ranking = rank(problem, opinion, refit, finalists, base, best, runs, holdout)
-    group = ambiguity_group(problem, opinion, finalists, options.limits)
+    group = ambiguity_group(problem, opinion, finalists)
     nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
     before, after = places
     location = _location(problem, opinion, holdout, nuisance, active, runs, before)
     experiment = None
-    if options.experiment is not None and len(group) > 1:
+    if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
         tell(0.97, "designing the next experiment")
         experiment = _next_experiment(problem, options, opinion, finalists, group, best)
     notes += _notes(contest, best, problem)

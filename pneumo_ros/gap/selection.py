@@ -20,7 +20,7 @@ from pneumo_ros.gap.problem import Problem
 from pneumo_ros.paths import share_file
 
 FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
-TOLL = 4.0  # of the cost, for each parameter
+TOLL = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
 SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
 
 
@@ -99,6 +99,14 @@ class Scored:
         """Number of effects."""
         return len(self.fit.candidate.parts)
 
+    @property
+    def price(self) -> float:
+        """Training cost with the toll of its parameters. An effect at one end that was seen is preferred to the same at
+        both, where the other end's was not: on another road it would act.
+        """
+        wide = sum(site == "both" for _, site in self.fit.candidate.parts)
+        return self.fit.cost + TOLL * (len(self.fit.x) + wide)
+
 
 def score(problem: Problem, fit: Fit) -> Scored:
     """Mean squares on the selection blocks; samples that are missing do not count."""
@@ -160,11 +168,11 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
 
 
 def _simplest(rivals: Sequence[Scored]) -> Scored:
-    """Among those within one standard error of the best: least training cost, each parameter paying :data:`TOLL`.
+    """Among those within one standard error of the best: the lowest price.
 
     The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
     structures that predict alike, the one that needs no stretched tolerance is right.
     """
     best = min(rivals, key=lambda s: s.level)
     close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
-    return min(close, key=lambda s: s.fit.cost + TOLL * len(s.fit.x))
+    return min(close, key=lambda s: s.price)

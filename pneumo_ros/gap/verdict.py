@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pneumo_ros.gap.problem import Candidate
-from pneumo_ros.gap.selection import TOLL, Scored
+from pneumo_ros.gap.selection import Scored
 
 
 @dataclass(frozen=True)
@@ -86,9 +86,17 @@ class Opinion:
     @property
     def probability(self) -> float:
         """Of the verdict: all candidates of the same effects count together, whatever their sites."""
-        if self.verdict == "unknown":
-            return self.unknown
-        return min(1.0, sum(p for c, p in self.named.items() if name_of(c) == self.verdict))
+        return self.unknown if self.verdict == "unknown" else self.of(self.verdict)
+
+    @property
+    def effects(self) -> dict[str, float]:
+        """Probability of each effect, or pair of effects, wherever it sits."""
+        names = dict.fromkeys(name_of(c) for c in self.named if c.parts)
+        return {name: self.of(name) for name in names}
+
+    def of(self, name: str) -> float:
+        """Probability of all candidates of a name."""
+        return min(1.0, sum(p for c, p in self.named.items() if name_of(c) == name))
 
 
 def name_of(candidate: Candidate) -> str:
@@ -122,7 +130,7 @@ def _named(
     tolls = (0.0, calibration.first_toll, calibration.first_toll + calibration.second_toll)
 
     def height(s: Scored) -> float:
-        return -calibration.sharpness * (s.fit.cost + TOLL * len(s.fit.x)) / s.samples - tolls[min(s.size, 2)]
+        return -calibration.sharpness * s.price / s.samples - tolls[min(s.size, 2)]
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())

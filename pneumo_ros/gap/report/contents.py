@@ -92,6 +92,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "parameters": _parameters(summary) if told else [],
         "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items() if told],
         "ambiguity": _ambiguity(summary, found.phrases) if told else [],
+        "rivals_are": _RIVALS.get(str(summary["verdict"]), "These fit it almost as well as the verdict:"),
         "experiment": summary.get("next_experiment"),
         "edit": _edit(summary),
         "refused": _refused(summary),
@@ -235,6 +236,12 @@ def rounded(value: float, std: float) -> str:
     power = int(np.floor(np.log10(max(abs(value), std))))
     places = max(power - digits, 0)
     return f"({value / 10.0**power:.{places}f} ± {std / 10.0**power:.{places}f})·10^{power}"
+
+
+_RIVALS = {
+    "none": "These are not excluded; what they would explain here is too little to accept one:",
+    "unknown": "These come closest, and one may be it by another law than the library's:",
+}
 
 
 def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[str]:
