@@ -11,6 +11,7 @@ import numpy as np
 from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.compete import Contest, Effort, Progress, compete
 from pneumo_ros.gap.diagnosis import Diagnosis, Experiment, Gap
+from pneumo_ros.gap.findings import Findings, Whereabouts
 from pneumo_ros.gap.fit import Fit, fit, sensitivities
 from pneumo_ros.gap.held_out import noise_floor, settle, total_gap
 from pneumo_ros.gap.model import Active, Array, Mask, Model
@@ -18,30 +19,9 @@ from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Problem
 from pneumo_ros.gap.ranking import rank
 from pneumo_ros.gap.runs import HeldOut, edit_test, held_runs
-from pneumo_ros.gap.selection import Scored, Thresholds, null_thresholds, score, select
+from pneumo_ros.gap.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.gap.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
-
-
-@dataclass(frozen=True)
-class Whereabouts:
-    """What flexible corrections on top of a structure say about the places of what it leaves.
-
-    Attributes
-    ----------
-    shares : (place, share of the held-out residual), largest first
-    left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
-    mendable : the same once the right places get a flexible correction
-    flat : noise, tolerances and model form explain what is left
-    kept : share of the equations' gap that this structure leaves; None for the nominal one, which leaves all of it
-    """
-
-    shares: tuple[tuple[str, float], ...]
-    left: float
-    mendable: float
-    flat: bool
-    kept: float | None = None
-
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
 TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
@@ -93,25 +73,28 @@ def diagnose(
     """
     options = options or Options()
     tell = progress or (lambda share, what: None)
-    notes: list[str] = []
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
     tell(0.9, "selecting and checking on the held-out log")
+    findings = _findings(contest, holdout, options, tell)
+    walls = at_bounds(contest.problem, findings.chosen.fit)
+    held = _on_held_out(findings)
+    opinion = judge(findings.refit, findings.finalists, findings.chosen, options.calibration, held, walls)
+    return _within_limits(_report(findings, opinion, options, tell, edit), [*fit_logs, holdout])
+
+
+def _findings(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Findings:
     problem = contest.problem
     refit = score(problem, contest.refit)
-    finalists = [score(problem, f) for f in contest.finalists]
+    finalists = tuple(score(problem, f) for f in contest.finalists)
     chosen = select(refit, finalists, options.limits)
     everything = np.ones(len(problem.measured), dtype=bool)
     base = _final(problem, contest.refit, everything)
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
-    places = _whereabouts(problem, base, best, holdout, options)
-    held, walls = _on_held_out(runs, holdout, places), at_bounds(problem, chosen.fit)
-    opinion = judge(refit, finalists, chosen, options.calibration, held, walls)
-    found = _report(
-        problem, contest, opinion, refit, finalists, base, best, runs, places, holdout, options, tell, notes, edit
-    )
-    return _within_limits(found, [*fit_logs, holdout])
+    found = Findings(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
+    before, after = _whereabouts(found, options.locate)
+    return replace(found, before=before, after=after)
 
 
 def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
@@ -135,34 +118,16 @@ def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
     return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
 
 
-def _report(
-    problem: Problem,
-    contest: Contest,
-    opinion: Opinion,
-    refit: Scored,
-    finalists: Sequence[Scored],
-    base: Fit,
-    best: Fit,
-    runs: Mapping[str, HeldOut],
-    places: tuple[Whereabouts | None, Whereabouts | None],
-    holdout: Any,
-    options: Options,
-    tell: Progress,
-    notes: list[str],
-    edit: Any | None,
-) -> Diagnosis:
-    model = problem.model
+def _report(findings: Findings, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
+    problem, contest, holdout, best = findings.problem, findings.contest, findings.holdout, findings.best
     tell(0.95, "ranking")
-    ranking = rank(problem, opinion, refit, finalists, base, best, runs, holdout)
-    group = ambiguity_group(problem, opinion, finalists)
-    nuisance, active = problem.nuisance(best.x), problem.active(best.candidate, problem.values(best.candidate, best.x))
-    before, after = places
-    location = _location(problem, opinion, holdout, nuisance, active, runs, before)
+    ranking = rank(findings, opinion)
+    group = ambiguity_group(problem, opinion, findings.finalists)
+    location = _location(findings, opinion)
     experiment = None
     if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
         tell(0.97, "designing the next experiment")
-        experiment = _next_experiment(problem, options, opinion, finalists, group, best)
-    notes += _notes(contest, best, problem)
+        experiment = _next_experiment(findings, opinion, group, options.experiment)
     cov = covariance(problem, best)
     tell(1.0, "done")
     hidden = _hidden(problem, contest)
@@ -173,17 +138,17 @@ def _report(
         location=tuple(location),
         ranking=tuple(ranking),
         ambiguity_group=group,
-        gap=_gap(model, holdout, runs),
+        gap=_gap(problem.model, holdout, findings.runs),
         nuisance=nuisance_estimates(problem, best, cov),
-        active=active,
+        active=findings.active,
         not_testable=hidden,
         experiment=experiment,
-        edit=None if edit is None else edit_test(problem, edit, base, best),
-        notes=tuple(notes),
+        edit=None if edit is None else edit_test(problem, edit, findings.base, best),
+        notes=tuple(_notes(contest, best, problem)),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
         tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
-        evidence=_evidence(refit, opinion.chosen, runs, before, after),
-        trajectories=_trajectories(holdout, runs),
+        evidence=_evidence(findings),
+        trajectories=_trajectories(holdout, findings.runs),
     )
 
 
@@ -193,11 +158,9 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
     return sensitivities(problem, again)
 
 
-def _on_held_out(
-    runs: Mapping[str, HeldOut], holdout: Any, places: tuple[Whereabouts | None, Whereabouts | None]
-) -> HeldOutGaps:
-    floor = total_gap(noise_floor(holdout))
-    before, after = places
+def _on_held_out(findings: Findings) -> HeldOutGaps:
+    floor = total_gap(noise_floor(findings.holdout))
+    before, after, runs = findings.before, findings.after, findings.runs
     told = before is not None and before.left > TELLING
     kept = after.kept if told and after is not None else None
     return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
@@ -211,64 +174,55 @@ def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
     return Gap(totals["nominal"], totals["refit"], totals["best"], total_gap(floor), per_channel)
 
 
-def _whereabouts(
-    problem: Problem, base: Fit, best: Fit, holdout: Any, options: Options
-) -> tuple[Whereabouts | None, Whereabouts | None]:
+def _whereabouts(findings: Findings, locate: Locate | None) -> tuple[Whereabouts | None, Whereabouts | None]:
     """Of what the nominal structure leaves, and of what the best named one leaves.
 
     The first starts at the nominal values: the search answers the tolerances itself, while those of the free-run refit
     have bent to the gap already.
     """
-    if options.locate is None:
+    if locate is None:
         return None, None
-    before = options.locate(problem.model, problem.records, holdout, None, ())
-    if best is base:
+    problem, holdout = findings.problem, findings.holdout
+    before = locate(problem.model, problem.records, holdout, None, ())
+    if findings.best is findings.base:
         return before, before
-    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
-    return before, options.locate(problem.model, problem.records, holdout, problem.nuisance(best.x), active)
+    return before, locate(problem.model, problem.records, holdout, findings.nuisance, findings.active)
 
 
-def _location(
-    problem: Problem,
-    opinion: Opinion,
-    holdout: Any,
-    nuisance: Array,
-    active: Sequence[Active],
-    runs: Mapping[str, HeldOut],
-    before: Whereabouts | None,
-) -> list[tuple[str, float]]:
+def _location(findings: Findings, opinion: Opinion) -> list[tuple[str, float]]:
     """A named effect's own places; else the places where a flexible correction of the nominal model helps.
 
     Not of the best named structure: a wrong name has bent the model where it acts.
     """
-    refit, best = runs["refit"].total, runs["best"].total
-    if opinion.verdict != "unknown" and active:
-        initial = settle(problem.model, holdout, nuisance, active)
-        return effect_shares(problem.model, holdout, nuisance, initial, active, max(0.0, 1.0 - best / refit))
+    model, holdout, runs = findings.problem.model, findings.holdout, findings.runs
+    if opinion.verdict != "unknown" and findings.active:
+        initial = settle(model, holdout, findings.nuisance, findings.active)
+        closed = max(0.0, 1.0 - runs["best"].total / runs["refit"].total)
+        return effect_shares(model, holdout, findings.nuisance, initial, findings.active, closed)
+    before = findings.before
     return [] if before is None else [(place, float(np.clip(share, 0.0, 1.0))) for place, share in before.shares]
 
 
-def _evidence(
-    refit: Scored, chosen: Scored, runs: Mapping[str, HeldOut], before: Whereabouts | None, after: Whereabouts | None
-) -> dict[str, float]:
+def _evidence(findings: Findings) -> dict[str, float]:
     """Numbers the verdict rests on."""
-    out = {"level_refit": refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
-    for name, one in (("refit", before), ("chosen", after)):
+    chosen = findings.chosen
+    out = {"level_refit": findings.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    for name, one in (("refit", findings.before), ("chosen", findings.after)):
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
-    return out | {f"gap_{name}": run.total for name, run in runs.items()}
+    return out | {f"gap_{name}": run.total for name, run in findings.runs.items()}
 
 
 def _next_experiment(
-    problem: Problem, options: Options, opinion: Opinion, finalists: Sequence[Scored], group: Sequence[str], best: Fit
+    findings: Findings, opinion: Opinion, group: Sequence[str], design: Callable[[Problem, Fit, Fit], Experiment | None]
 ) -> Experiment | None:
     """Split the verdict from its strongest rival."""
-    assert options.experiment is not None
-    rivals = [s for s in finalists if name_of(s.fit.candidate) in group and name_of(s.fit.candidate) != opinion.verdict]
+    names = [(name_of(s.fit.candidate), s) for s in findings.finalists]
+    rivals = [s for name, s in names if name in group and name != opinion.verdict]
     if not rivals:
         return None
-    return options.experiment(problem, best, min(rivals, key=lambda s: s.level).fit)
+    return design(findings.problem, findings.best, min(rivals, key=lambda s: s.level).fit)
 
 
 def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from pneumo_ros.gap.compete import with_jacobian
 from pneumo_ros.gap.diagnosis import Ranked
+from pneumo_ros.gap.findings import Findings
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.held_out import bootstrap_shrink
 from pneumo_ros.gap.model import Active, Model
@@ -20,26 +20,19 @@ from pneumo_ros.gap.uncertainty import covariance, effect_estimates
 from pneumo_ros.gap.verdict import Opinion
 
 
-def rank(
-    problem: Problem,
-    opinion: Opinion,
-    nominal: Scored,
-    finalists: Sequence[Scored],
-    base: Fit,
-    best: Fit,
-    runs: Mapping[str, HeldOut],
-    holdout: Any,
-) -> list[Ranked]:
+def rank(findings: Findings, opinion: Opinion) -> list[Ranked]:
     """Nominal structure, unknown, and every finalist; the most probable first."""
-    refit = runs["refit"]
+    problem, holdout, base, best = findings.problem, findings.holdout, findings.base, findings.best
+    refit = findings.runs["refit"]
     fitted = problem.gap(base.residual)
-    out = [replace(_plain(("none",), opinion.named[Candidate()], refit.total, fitted), evidence=_weighed(nominal))]
+    nominal = _plain(("none",), opinion.named[Candidate()], refit.total, fitted)
+    out = [replace(nominal, evidence=_weighed(findings.refit))]
     if opinion.unknown > 1e-3:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
-    for scored in finalists:
+    for scored in findings.finalists:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else with_jacobian(problem, scored.fit)
-        run = runs["best"] if same else held_by(problem, one, holdout)
+        run = findings.runs["best"] if same else held_by(problem, one, holdout)
         ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
         out.append(replace(ranked, evidence=_weighed(scored)))
     return sorted(out, key=lambda r: -r.probability)

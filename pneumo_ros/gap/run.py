@@ -11,9 +11,10 @@ import numpy as np
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap import effects as effect_files
 from pneumo_ros.gap.compete import Progress
-from pneumo_ros.gap.diagnose import Options, Whereabouts, diagnose, split_by_time
+from pneumo_ros.gap.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
 from pneumo_ros.gap.effects.base import Effect
+from pneumo_ros.gap.findings import Whereabouts
 from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
