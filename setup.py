@@ -28,7 +28,7 @@ def share(pattern: str) -> list[str]:
 
 setup(
     name=NAME,
-    version="0.2.0",
+    version="0.3.0",
     description="Active pneumatic half-car rig: simulate, drive, log, replay, and diagnose the sim-to-real gap",
     license="Apache-2.0",
     author="pneumo_ros maintainers",

@@ -30,7 +30,9 @@ Only = Annotated[str, typer.Option(help="Only cases whose name contains this.")]
 @app.command()
 def make(
     folder: Folder,
-    set_name: Annotated[str, typer.Option("--set", help="full (240 cases), full-0.1, dev, dev2, dev3, ci.")] = "dev",
+    set_name: Annotated[
+        str, typer.Option("--set", help="full (240 cases), full-0.2, full-0.1, dev, dev2 to dev5, ci.")
+    ] = "dev",
     workers: Workers = 1,
     scheduler: Scheduler = "",
     only: Only = "",

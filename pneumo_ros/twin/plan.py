@@ -54,7 +54,8 @@ class Mix:
 
 # A release opens its full set once and gets a new seed; the sets of earlier releases stay by name.
 SETS: dict[str, Mix] = {
-    "full": Mix(20262, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
+    "full": Mix(20263, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
+    "full-0.2": Mix(20262, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
     "full-0.1": Mix(20261, none=64, single=100, pair=36, unknown=28, withheld=12, decoys=12),
     "dev": Mix(1, none=16, single=25, pair=9, unknown=7, withheld=3, decoys=3),
     "dev2": Mix(2, none=16, single=48, pair=12, unknown=14, withheld=6, decoys=4),

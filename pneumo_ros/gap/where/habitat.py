@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.gap.where.locate import Location, corrected_residual
-from pneumo_ros.gap.where.regimes import Regime, bands, regimes, sharpest, shows_in
+from pneumo_ros.gap.where.regimes import BANDS, Regime, bands, regimes, sharpest, shows_in
 from pneumo_ros.gap.where.weak import EQUATIONS
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Habitat:
     def text(self) -> str:
         """For example "in fast motion (90 % of it in 50 % of the time), mostly at 1-4 Hz"."""
         low, high, share = self.band
-        where = f"{100 * share:.0f} % of it at {low:g}-{high:g} Hz"
+        where = f"{100 * share:.0f} % of it " + (f"above {low:g} Hz" if low >= BANDS[-1] else f"at {low:g}-{high:g} Hz")
         if self.regime is None:
             return f"it shows in every regime, {where}"
         r = self.regime
