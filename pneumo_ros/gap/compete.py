@@ -16,9 +16,9 @@ import numpy as np
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
-from pneumo_ros.gap.model import Array
+from pneumo_ros.gap.model import Array, EffectParameter
 from pneumo_ros.gap.problem import SELECT_EVERY, Candidate, Part, Problem
-from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, start_values, trials, visibility
+from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, trials, visibility
 from pneumo_ros.gap.selection import FORM, Thresholds, noise_level, score
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 
@@ -312,14 +312,24 @@ def _finish(problem: Problem, short: Fit, effort: Effort, shapes: bool) -> Fit:
     parameters = problem.effect_parameters(short.candidate)
     if not shapes or all(p.size for p in parameters):
         return best
-    for values in start_values(parameters)[2:]:
-        kept = problem.values(best.candidate, best.x)
-        mixed = [k if p.size else v for v, k, p in zip(values, kept, parameters, strict=True)]
-        start = problem.start(short.candidate, best.x[: problem.fixed], mixed)
+    for values in _elsewhere(parameters, problem.values(best.candidate, best.x)):
+        start = problem.start(short.candidate, best.x[: problem.fixed], values)
         other = fit(problem, short.candidate, start, best.jacobian, iterations=effort.short)
         if other.cost < best.cost - 1.0:
             best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
     return best
+
+
+def _elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
+    """Starts away from where a fit ended: each shape at its further starts, and each size with the other sign."""
+    out = []
+    for k, p in enumerate(parameters):
+        if not p.size:
+            out += [[value if m == k else float(v) for m, v in enumerate(found)] for value in p.starts]
+            continue
+        other = [value for value in (p.typical, *p.starts) if value * found[k] < 0.0][:1]
+        out += [[value if m == k else q.typical for m, q in enumerate(parameters)] for value in other]
+    return out
 
 
 def with_jacobian(problem: Problem, state: Fit) -> Fit:

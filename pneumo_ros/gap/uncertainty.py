@@ -111,8 +111,8 @@ def at_bounds(problem: Problem, fit: Fit) -> int:
 
 
 def _absent(parameter: EffectParameter, value: float) -> bool:
-    """A size that ended at zero: no effect, which is no wall."""
-    return parameter.size and parameter.low == 0.0 and value == 0.0
+    """A parameter that ended at zero: an effect, or a part of its law, that is not there is no wall."""
+    return parameter.low == 0.0 and value == 0.0
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:

@@ -31,7 +31,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("stop_stiffness", "N/m", 0.0, 1e6, 2e4, size=True, starts=(1e5,)),
         EffectParameter("stop_lead", "m", 0.0, 0.014, 0.004, starts=(0.008, 0.012, 0.001)),
-        EffectParameter("stop_hardening", "1/m", 0.0, 1000.0, 100.0),
+        EffectParameter("stop_hardening", "1/m", 0.0, 1e4, 100.0),
         EffectParameter("stop_damping", "s/m", 0.0, 2.0, 0.2),
     ),
     term=PlantTerm(force=force),

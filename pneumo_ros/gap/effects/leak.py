@@ -1,10 +1,13 @@
 """Air leaks from a spring to the atmosphere through an opening that no valve commands.
 
-Law 0 is a hole (Eq. 4.11), law 1 a long narrow gap (laminar flow of a gas grows with P^2 - Pa^2); between them a blend.
+Law 0 is a hole (Eq. 4.11), law 1 a long narrow gap (the laminar mass flow of a gas grows with (P^2 - Pa^2)/T); between
+them a blend.
 The area is that of the hole with the same flow at a reference pressure. No tolerance of the outlet valve scales it.
 """
 
 from __future__ import annotations
+
+import math
 
 from numba import njit
 
@@ -23,7 +26,9 @@ Values = tuple[float, float]
 @njit(cache=True, error_model="numpy")
 def air(air: Air, z: tuple[float, ...], p: Values) -> float:
     """Pressure rate of the air lost."""
-    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure)
+    # The hole's flow holds P and 1/sqrt(T).
+    cold = math.sqrt(air.supply_temperature / air.temperature)
+    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure) * cold
     flow = p[0] * air.escape * (1.0 + p[1] * (gap - 1.0))
     return -air.exponent * GAS_CONSTANT * air.temperature * flow / air.volume
 
