@@ -39,7 +39,7 @@ TURNOVER = 5e-4  # m/s over which dry friction changes sign: below the pixel of 
 
 # How much of the misfit a right law may leave: the default is calibrated on simulated half cars, whose laws are cleaner
 # than a real disc on a real wall.
-REAL = Calibration(leftover=0.4)
+REAL = Calibration(leftover=0.4, leftover_held=0.4)
 
 PARAMETERS = (
     Parameter("mass", "kg", 3.0799, 0.03),

@@ -43,7 +43,7 @@ WANDER = 300.0  # Pa: how the reading of the tight chamber wanders about its own
 EVIDENCE = Thresholds(first_cost=6.0)
 # How much of the misfit a right law may leave: the default is calibrated on simulated half cars, whose laws are cleaner
 # than a real chamber's, whose reading wanders by seconds.
-REAL = Calibration(leftover=0.4)
+REAL = Calibration(leftover=0.4, leftover_held=0.4)
 
 # The fit keeps a parameter within REACH standard deviations: the bound is what still counts as tight.
 PARAMETERS = (Parameter("seepage", "1/s", 0.0, TIGHT / HOLD / REACH),)

@@ -42,6 +42,8 @@ class EffectParameter:
     typical : a size (or shape) worth trying first; also the scale of the fit
     size : True for the parameter whose zero means "no effect"; False for one that shapes it
     starts : further values to start the fit from
+    ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
+        well stop; a stop at another bound is counted against the effect
     """
 
     name: str
@@ -51,6 +53,7 @@ class EffectParameter:
     typical: float
     size: bool = False
     starts: tuple[float, ...] = ()
+    ends: tuple[float, ...] = (0.0,)
 
 
 @dataclass(frozen=True)

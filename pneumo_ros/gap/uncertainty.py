@@ -66,7 +66,7 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
         name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
         while name in out:
             name += "_2"
-        at_bound = not free[m] and not _absent(p, fit.x[m])
+        at_bound = not free[m] and not _natural(p, value)
         out[name] = Estimate(
             value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
         )
@@ -106,13 +106,13 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
 def at_bounds(problem: Problem, fit: Fit) -> int:
     """How many parameters of its effects ended at an end of their allowed range."""
     free, parameters = _free(problem, fit), problem.effect_parameters(fit.candidate)
-    return sum(not free[problem.fixed + k] and not _absent(p, fit.x[problem.fixed + k])
-               for k, p in enumerate(parameters))  # fmt: skip
+    values = problem.values(fit.candidate, fit.x)
+    return sum(not free[problem.fixed + k] and not _natural(p, values[k]) for k, p in enumerate(parameters))
 
 
-def _absent(parameter: EffectParameter, value: float) -> bool:
-    """A parameter that ended at zero: an effect, or a part of its law, that is not there is no wall."""
-    return parameter.low == 0.0 and value == 0.0
+def _natural(parameter: EffectParameter, value: float) -> bool:
+    """Whether a value is a natural end of its law: a part that is absent, a share that is whole."""
+    return any(abs(value - end) <= 1e-9 * abs(parameter.typical) for end in parameter.ends)
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:

@@ -27,8 +27,10 @@ class Calibration:
     sharpness : fall of log probability per unit of log mean square of the fitted data: as many samples' worth of
         evidence, however long the log, because laws differ by more than chance does
     first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
-    leftover : share of the refit's misfit (rms) left by the best named structure at which "unknown" is as likely as it
-    steepness : exponent of that transition
+    leftover : share of the refit's misfit (rms) on the selection blocks left by the best named structure at which
+        "unknown" is as likely as it
+    leftover_held : the same of the held-out free run, where the command's jumps are known to a row only
+    steepness : exponent of these transitions
     floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     held : held-out gap over the noise floor that a right structure may leave (jitter, lost samples, jumps between rows)
@@ -40,13 +42,14 @@ class Calibration:
     sharpness: float = 36.0
     first_toll: float = 9.0
     second_toll: float = 9.0
-    leftover: float = 0.18
+    leftover: float = 0.05
+    leftover_held: float = 0.18
     steepness: float = 4.0
-    floor: float = 1.0
+    floor: float = 0.6
     real: float = 2.5
     held: float = 1.5
     kept: float = 0.25
-    walls: float = 1.9
+    walls: float = 1.3
     held_real: float = 3.0
 
 
@@ -147,9 +150,9 @@ def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: Held
         share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
         share += (beyond(held.refit, 1.0) / beyond(calibration.held_real, 1.0)) ** calibration.steepness
     else:
-        left = max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9)
+        left = np.sqrt(max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9))
         left_held = beyond(held.chosen, calibration.held) / max(beyond(held.refit, 1.0), calibration.held)
-        share = (max(np.sqrt(left), left_held) / calibration.leftover) ** calibration.steepness
+        share = max(left / calibration.leftover, left_held / calibration.leftover_held) ** calibration.steepness
         if held.kept is not None:
             share = max(share, (held.kept / calibration.kept) ** calibration.steepness)
         # A law that is bent to the ends of what it can do stands in for another one.

@@ -57,7 +57,7 @@ EFFECT = Effect(
         EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True),
         EffectParameter("mode_frequency", "Hz", 3.0, 40.0, 15.0, starts=(8.0, 28.0)),
         EffectParameter("mode_damping_ratio", "1", 0.01, 0.25, 0.08),
-        EffectParameter("wall_share", "1", 0.0, 1.0, 0.5),
+        EffectParameter("wall_share", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0)),
     ),
     term=PlantTerm(states=2, start=start, advance=advance, force=force),
 )

@@ -21,6 +21,6 @@ EFFECT = Effect(
     summary="the wheel leaves the ground: no pull from the tyre",
     sites=ENDS,
     places=("{end}_tyre",),
-    parameters=(EffectParameter("lost_pull", "1", 0.0, 1.0, 0.9, size=True),),
+    parameters=(EffectParameter("lost_pull", "1", 0.0, 1.0, 0.9, size=True, ends=(0.0, 1.0)),),
     term=PlantTerm(tyre=tyre),
 )
