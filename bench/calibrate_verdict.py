@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.gap.diagnose import TELLING
 from pneumo_ros.gap.selection import TOLL
-from pneumo_ros.gap.verdict import Calibration, beyond
+from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, nameless
 
 FOREIGN = ("unknown", "withheld")
 
@@ -45,14 +46,10 @@ def unknown_share(found: dict[str, Any], constants: Calibration) -> float:
     """Probability of "unknown" from the evidence, with other constants."""
     e, gap = found["evidence"], found["gap"]
     refit, best = (gap[name] / gap["noise_floor"] for name in ("refit", "best"))
-    if e["effects"] == 0:
-        ratio = (e["level_refit"] / constants.real) ** (0.5 * constants.steepness)
-        ratio += (beyond(refit, 1.0) / beyond(constants.held_real, 1.0)) ** constants.steepness
-    else:
-        left = np.sqrt(max(0.0, e["level_chosen"] - constants.floor) / max(e["level_refit"], 1e-9))
-        left_held = beyond(best, constants.held) / max(beyond(refit, 1.0), constants.held)
-        ratio = (max(left, left_held) / constants.leftover) ** constants.steepness
-    return float(np.clip(ratio / (1.0 + ratio), 1e-3, 1.0 - 1e-3))
+    kept = e.get("kept_chosen") if e.get("equations_refit", 0.0) > TELLING else None
+    level = e["level_chosen"] if e["effects"] else None
+    share = nameless(e["level_refit"], level, HeldOutGaps(refit, best, kept), int(e.get("walls", 0)), constants)
+    return float(np.clip(share, 1e-3, 1.0 - 1e-3))
 
 
 def height(weighed: dict[str, float], entry: dict[str, Any], constants: Calibration) -> float:
@@ -94,11 +91,11 @@ def main() -> None:
     report(cases)
     foreign = [truth(label) == "unknown" for label, _ in cases]
     loss = []
-    for leftover, steepness, real in product((0.1, 0.14, 0.18, 0.22, 0.3), (2.0, 3.0, 4.0, 6.0), (1.5, 2.5, 4.0)):
-        c = replace(Calibration(), leftover=leftover, steepness=steepness, real=real)
+    for leftover, held, walls in product((0.03, 0.05, 0.08, 0.12, 0.18), (0.1, 0.14, 0.18, 0.25), (1.0, 1.3, 1.9)):
+        c = replace(Calibration(), leftover=leftover, leftover_held=held, walls=walls)
         share = [unknown_share(found, c) if out else 1.0 - unknown_share(found, c)
                  for out, (_, found) in zip(foreign, cases, strict=True)]  # fmt: skip
-        loss.append((-float(np.mean(np.log(share))), f"leftover {leftover}, steepness {steepness}, real {real}"))
+        loss.append((-float(np.mean(np.log(share))), f"leftover {leftover}, held {held}, walls {walls}"))
     print("known or unknown:", *(f"  log loss {value:.3f}: {what}" for value, what in sorted(loss)[:4]), sep="\n")
     known = [case for case, out in zip(cases, foreign, strict=True) if not out]
     loss = []

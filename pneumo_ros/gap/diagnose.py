@@ -76,8 +76,7 @@ def diagnose(
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
     tell(0.9, "selecting and checking on the held-out log")
     findings = _findings(contest, holdout, options, tell)
-    walls = at_bounds(contest.problem, findings.chosen.fit)
-    held = _on_held_out(findings)
+    held, walls = _on_held_out(findings), at_bounds(contest.problem, findings.chosen.fit)
     opinion = judge(findings.refit, findings.finalists, findings.chosen, options.calibration, held, walls)
     return _within_limits(_report(findings, opinion, options, tell, edit), [*fit_logs, holdout])
 
@@ -207,6 +206,7 @@ def _evidence(findings: Findings) -> dict[str, float]:
     """Numbers the verdict rests on."""
     chosen = findings.chosen
     out = {"level_refit": findings.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    out |= {"walls": float(at_bounds(findings.problem, chosen.fit))}
     for name, one in (("refit", findings.before), ("chosen", findings.after)):
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}

@@ -120,7 +120,7 @@ def judge(
     ``walls`` counts the chosen structure's parameters at a bound.
     """
     named = _named(refit, finalists, chosen, calibration)
-    unknown = _unknown(refit, chosen, calibration, held, walls)
+    unknown = nameless(refit.level, chosen.level if chosen.size else None, held, walls, calibration)
     scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
     verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
     return Opinion(chosen, verdict, scaled, unknown)
@@ -144,19 +144,28 @@ def _named(
     return {c: w / total for c, w in weights.items()}
 
 
-def _unknown(refit: Scored, chosen: Scored, calibration: Calibration, held: HeldOutGaps, walls: int) -> float:
-    """Probability that what is left is the work of something without a name."""
-    if chosen.size == 0:
-        share = (refit.level / calibration.real) ** (0.5 * calibration.steepness)
-        share += (beyond(held.refit, 1.0) / beyond(calibration.held_real, 1.0)) ** calibration.steepness
-    else:
-        left = np.sqrt(max(0.0, chosen.level - calibration.floor) / max(refit.level, 1e-9))
-        left_held = beyond(held.chosen, calibration.held) / max(beyond(held.refit, 1.0), calibration.held)
-        share = max(left / calibration.leftover, left_held / calibration.leftover_held) ** calibration.steepness
-        if held.kept is not None:
-            share = max(share, (held.kept / calibration.kept) ** calibration.steepness)
-        # A law that is bent to the ends of what it can do stands in for another one.
-        share = max(share, (walls / calibration.walls) ** calibration.steepness)
+def nameless(
+    level_refit: float, level_chosen: float | None, held: HeldOutGaps, walls: int, calibration: Calibration
+) -> float:
+    """Probability that what is left is the work of something without a name.
+
+    Parameters
+    ----------
+    level_refit, level_chosen : mean squares on the selection blocks, sigmas; None where no effect was chosen
+    held, walls, calibration : as in :func:`judge`
+    """
+    c = calibration
+    if level_chosen is None:
+        share = (level_refit / c.real) ** (0.5 * c.steepness)
+        share += (beyond(held.refit, 1.0) / beyond(c.held_real, 1.0)) ** c.steepness
+        return float(share / (1.0 + share))
+    left = np.sqrt(max(0.0, level_chosen - c.floor) / max(level_refit, 1e-9))
+    left_held = beyond(held.chosen, c.held) / max(beyond(held.refit, 1.0), c.held)
+    # A law that is bent to the ends of what it can do stands in for another one.
+    against = [left / c.leftover, left_held / c.leftover_held, walls / c.walls]
+    if held.kept is not None:
+        against.append(held.kept / c.kept)
+    share = max(against) ** c.steepness
     return float(share / (1.0 + share))
 
 
