@@ -42,7 +42,7 @@ class Effort:
     pair_finalists : pairs fitted to convergence
     probes : second effects probed on each leader
     exchanged : rivals probed in place of each effect of the best pair
-    short, long : iterations of a short and of a full fit
+    short, anew, long : iterations of a short fit, of one from another shape, of a full one
     """
 
     singles: int = 10
@@ -53,6 +53,7 @@ class Effort:
     probes: int = 24
     exchanged: int = 6
     short: int = 3
+    anew: int = 5
     long: int = 8
 
 
@@ -169,7 +170,10 @@ def _run_singles(contest: Contest) -> None:
     contest.visible = visibility(problem, contest.refit, found)
     chosen = _varied(_probed(problem, contest.refit, contest.promised), effort.singles, 3)
     short = _short_fits(contest, contest.refit, chosen, (0.1, 0.4))
-    ended = [_finish(problem, one, effort, k < STARTED_TWICE) for k, one in enumerate(short[: effort.finalists])]
+    ended = [
+        _finish(problem, one, effort, contest.refit if k < STARTED_TWICE else None)
+        for k, one in enumerate(short[: effort.finalists])
+    ]
     contest.singles = _by_cost(ended) + short[effort.finalists :]
 
 
@@ -195,7 +199,7 @@ def _run_pairs(contest: Contest) -> None:
     found = trials(problem, contest.refit, all_parts(problem))
     blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
     short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
-    ended = [_finish(problem, one, effort, False) for one in short[: effort.pair_finalists]]
+    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
     _exchange_each(contest)
     _try_without_each(contest)
@@ -219,7 +223,7 @@ def _exchange_each(contest: Contest) -> None:
         promised = promises(problem, alone, trials(problem, alone, rivals))
         fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
         for short in _short_fits(contest, alone, _probed(problem, alone, fresh)[:1], (0.86, 0.88)):
-            contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort, False)])
+            contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
 
 
 def _rivals(problem: Problem, part: Part, other: Part) -> bool:
@@ -306,15 +310,18 @@ def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tu
     return _by_cost(out)
 
 
-def _finish(problem: Problem, short: Fit, effort: Effort, shapes: bool) -> Fit:
-    """To convergence, from where the short fit ended and, with ``shapes``, from its effect's other shapes; the best."""
+def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = None) -> Fit:
+    """To convergence, from where the short fit ended; with a fit to start ``anew`` from, also from its effect's other
+    shapes and signs there; the best.
+    """
     best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
     parameters = problem.effect_parameters(short.candidate)
-    if not shapes or all(p.size for p in parameters):
+    if anew is None or all(p.size for p in parameters):
         return best
     for values in _elsewhere(parameters, problem.values(best.candidate, best.x)):
-        start = problem.start(short.candidate, best.x[: problem.fixed], values)
-        other = fit(problem, short.candidate, start, best.jacobian, iterations=effort.short)
+        # Not from where this fit ended: its tolerance parameters have bent to the shape it has.
+        start = problem.start(short.candidate, anew.x[: problem.fixed], values)
+        other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
         if other.cost < best.cost - 1.0:
             best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
     return best
