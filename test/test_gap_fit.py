@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from rig_logs import excitation, signals_of, simulated
 
-from pneumo_ros.gap.compete import Effort
+from pneumo_ros.gap.compete import Effort, starts_elsewhere
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.events import timed
-from pneumo_ros.gap.fit import bounded_newton, fit, sensitivities
+from pneumo_ros.gap.fit import Fit, bounded_newton, fit, sensitivities
 from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
 from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.screen import all_parts, promises, trials, visibility
 from pneumo_ros.gap.signals import Signals
-from pneumo_ros.gap.uncertainty import covariance, nuisance_estimates
+from pneumo_ros.gap.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 
@@ -201,3 +201,27 @@ def test_a_rig_at_rest_shows_hardly_any_effect(model: RigModel) -> None:
         assert still[effect] < 0.5
     for effect in ("coulomb_friction", "valve_lag", "tyre_damping", "leak", "supply_droop"):
         assert driven_rig[effect] > 1.0
+
+
+def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
+    """A slope that is too steep, with an error of the wrong sign, fits an orifice well enough to be stuck there."""
+    orifice = model.effects["orifice_coefficient"].parameters
+    tried = starts_elsewhere(orifice, np.array([-0.0145, 1.65, 1.2]))
+    assert tried == [[0.08, 0.5, 0.5], [-0.0145, -0.5, 1.2], [-0.0145, 1.65, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "walls"),
+    [
+        ("bump_stop", (2e4, 0.004, 0.0, 0.0), 0),  # a stop without hardening or loss
+        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 2),
+        ("bellows_mode", (0.2, 12.0, 0.08, 1.0), 0),  # all of the damping is the wall's own
+        ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 2),
+    ],
+)
+def test_natural_ends_of_a_law_are_no_walls(
+    model: RigModel, effect: str, values: tuple[float, ...], walls: int
+) -> None:
+    problem, candidate = Problem(model, (log(model, 1),)), Candidate(((effect, "front"),))
+    x = problem.start(candidate, None, values)
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == walls

@@ -318,7 +318,7 @@ def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = Non
     parameters = problem.effect_parameters(short.candidate)
     if anew is None or all(p.size for p in parameters):
         return best
-    for values in _elsewhere(parameters, problem.values(best.candidate, best.x)):
+    for values in starts_elsewhere(parameters, problem.values(best.candidate, best.x)):
         # Not from where this fit ended: its tolerance parameters have bent to the shape it has.
         start = problem.start(short.candidate, anew.x[: problem.fixed], values)
         other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
@@ -327,7 +327,7 @@ def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = Non
     return best
 
 
-def _elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
+def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
     """Starts away from where a fit ended: each shape at its further starts, and each size with the other sign."""
     out = []
     for k, p in enumerate(parameters):
