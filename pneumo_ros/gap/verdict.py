@@ -42,7 +42,7 @@ class Calibration:
     sharpness: float = 36.0
     first_toll: float = 9.0
     second_toll: float = 9.0
-    leftover: float = 0.05
+    leftover: float = 0.065
     leftover_held: float = 0.18
     steepness: float = 4.0
     floor: float = 0.6
