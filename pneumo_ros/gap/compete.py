@@ -121,7 +121,8 @@ def _in_turn(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
     be fitted to it.
     """
     squares = np.where(problem.weight > 0.0, refit.residual**2, 0.0).sum(axis=1)
-    shares = [squares[problem.block % SELECT_EVERY == turn].sum() / squares.sum() for turn in range(SELECT_EVERY)]
+    whole = max(float(squares.sum()), 1e-12)
+    shares = [squares[problem.block % SELECT_EVERY == turn].sum() / whole for turn in range(SELECT_EVERY)]
     if LOPSIDED[0] <= shares[problem.turn] <= LOPSIDED[1]:
         return problem, refit
     turn = int(np.argmin(np.abs(np.array(shares) - 1.0 / SELECT_EVERY)))

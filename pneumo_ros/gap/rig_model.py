@@ -43,7 +43,7 @@ SPARSE = 0.1  # more jumps than this share of rows are a signal, not events
 # The log stamps commands no finer than a sample and says nothing of the bus: a shift of all commands within a sample
 # is no effect.
 COMMAND_DELAY = "command_delay"
-COMMAND_DELAY_STD = 1.5e-4  # s; logs of three independent writers show up to 0.12 ms
+COMMAND_DELAY_STD = 1.5e-4  # s; rigs without a fault show up to 0.12 ms
 SLOPE_SHARE = 0.5  # of the volume scale's tolerance, for the slope of V(h) about the design height
 Memories = tuple[Memory, ...]  # one an effect; empty before the first block
 NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
