@@ -157,6 +157,13 @@ def test_the_verdict_itself_is_no_rival_of_its_own() -> None:
     assert "leak+orifice_coefficient: the spring leaks and an orifice" in render(replace(findings(), summary=pair))
 
 
+@pytest.mark.parametrize(("verdict", "words"), [("none", "These are not excluded"), ("unknown", "These come closest")])
+def test_what_is_not_excluded_is_listed_without_a_name_as_well(verdict: str, words: str) -> None:
+    summary = {**findings().summary, "verdict": verdict, "ambiguity_group": ["leak"], "next_experiment": None}
+    page = render(replace(findings(), summary=summary))
+    assert words in page and "<li>leak: the spring leaks" in page
+
+
 @pytest.mark.parametrize("place", PLACES)
 def test_every_place_is_on_the_map(place: str) -> None:
     drawing = draw_map({place: 0.8})
