@@ -47,7 +47,8 @@ def _active(one: NamedEffect, rig: Rig, library: Mapping[str, Effect]) -> Active
     given, names = dict(one.parameters), [p.name for p in effect.parameters]
     if set(given) != set(names):
         raise InputError("wrong parameters", where=where, key=one.effect, value=", ".join(given),
-                         allowed=", ".join(names))  # fmt: skip
+                         allowed=", ".join(names),
+                         remedy="give them all; a rig saved by another version is saved again by this one")  # fmt: skip
     for p in effect.parameters:
         if not p.low <= given[p.name] <= p.high or not math.isfinite(given[p.name]):
             raise InputError("value out of range", where=where, key=f"{one.effect}.{p.name}", value=given[p.name],
