@@ -50,6 +50,7 @@ setup(
         "rich>=13,<16",
         "matplotlib>=3.8,<4",
         "Jinja2>=3.1,<4",
+        "MarkupSafe>=2.1,<4",
         "cobs>=1.2,<2",
         "pyserial>=3.5,<4",
         "fastcrc>=0.3,<1",

@@ -11,10 +11,10 @@ import numpy as np
 from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.compete import Contest, Effort, Progress, compete
 from pneumo_ros.gap.diagnosis import Diagnosis, Experiment, Gap
-from pneumo_ros.gap.findings import Findings, Whereabouts
 from pneumo_ros.gap.fit import Fit, fit, sensitivities
 from pneumo_ros.gap.held_out import noise_floor, settle, total_gap
 from pneumo_ros.gap.model import Active, Array, Mask, Model
+from pneumo_ros.gap.outcome import Outcome, Whereabouts
 from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Problem
 from pneumo_ros.gap.ranking import rank
@@ -75,13 +75,13 @@ def diagnose(
     tell = progress or (lambda share, what: None)
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
     tell(0.9, "selecting and checking on the held-out log")
-    findings = _findings(contest, holdout, options, tell)
-    held, walls = _on_held_out(findings), at_bounds(contest.problem, findings.chosen.fit)
-    opinion = judge(findings.refit, findings.finalists, findings.chosen, options.calibration, held, walls)
-    return _within_limits(_report(findings, opinion, options, tell, edit), [*fit_logs, holdout])
+    outcome = _outcome(contest, holdout, options, tell)
+    held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
+    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, walls)
+    return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
 
 
-def _findings(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Findings:
+def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Outcome:
     problem = contest.problem
     refit = score(problem, contest.refit)
     finalists = tuple(score(problem, f) for f in contest.finalists)
@@ -91,7 +91,7 @@ def _findings(contest: Contest, holdout: Any, options: Options, tell: Progress) 
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
-    found = Findings(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
+    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
     before, after = _whereabouts(found, options.locate)
     return replace(found, before=before, after=after)
 
@@ -117,16 +117,16 @@ def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
     return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
 
 
-def _report(findings: Findings, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
-    problem, contest, holdout, best = findings.problem, findings.contest, findings.holdout, findings.best
+def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
+    problem, contest, holdout, best = outcome.problem, outcome.contest, outcome.holdout, outcome.best
     tell(0.95, "ranking")
-    ranking = rank(findings, opinion)
-    group = ambiguity_group(problem, opinion, findings.finalists)
-    location = _location(findings, opinion)
+    ranking = rank(outcome, opinion)
+    group = ambiguity_group(problem, opinion, outcome.finalists)
+    location = _location(outcome, opinion)
     experiment = None
     if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
         tell(0.97, "designing the next experiment")
-        experiment = _next_experiment(findings, opinion, group, options.experiment)
+        experiment = _next_experiment(outcome, opinion, group, options.experiment)
     cov = covariance(problem, best)
     tell(1.0, "done")
     hidden = _hidden(problem, contest)
@@ -137,17 +137,17 @@ def _report(findings: Findings, opinion: Opinion, options: Options, tell: Progre
         location=tuple(location),
         ranking=tuple(ranking),
         ambiguity_group=group,
-        gap=_gap(problem.model, holdout, findings.runs),
+        gap=_gap(problem.model, holdout, outcome.runs),
         nuisance=nuisance_estimates(problem, best, cov),
-        active=findings.active,
+        active=outcome.active,
         not_testable=hidden,
         experiment=experiment,
-        edit=None if edit is None else edit_test(problem, edit, findings.base, best),
+        edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
         notes=tuple(_notes(contest, best, problem)),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
         tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
-        evidence=_evidence(findings),
-        trajectories=_trajectories(holdout, findings.runs),
+        evidence=_evidence(outcome),
+        trajectories=_trajectories(holdout, outcome.runs),
     )
 
 
@@ -157,9 +157,9 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
     return sensitivities(problem, again)
 
 
-def _on_held_out(findings: Findings) -> HeldOutGaps:
-    floor = total_gap(noise_floor(findings.holdout))
-    before, after, runs = findings.before, findings.after, findings.runs
+def _on_held_out(outcome: Outcome) -> HeldOutGaps:
+    floor = total_gap(noise_floor(outcome.holdout))
+    before, after, runs = outcome.before, outcome.after, outcome.runs
     told = before is not None and before.left > TELLING
     kept = after.kept if told and after is not None else None
     return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
@@ -173,7 +173,7 @@ def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
     return Gap(totals["nominal"], totals["refit"], totals["best"], total_gap(floor), per_channel)
 
 
-def _whereabouts(findings: Findings, locate: Locate | None) -> tuple[Whereabouts | None, Whereabouts | None]:
+def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts | None, Whereabouts | None]:
     """Of what the nominal structure leaves, and of what the best named one leaves.
 
     The first starts at the nominal values: the search answers the tolerances itself, while those of the free-run refit
@@ -181,48 +181,48 @@ def _whereabouts(findings: Findings, locate: Locate | None) -> tuple[Whereabouts
     """
     if locate is None:
         return None, None
-    problem, holdout = findings.problem, findings.holdout
+    problem, holdout = outcome.problem, outcome.holdout
     before = locate(problem.model, problem.records, holdout, None, ())
-    if findings.best is findings.base:
+    if outcome.best is outcome.base:
         return before, before
-    return before, locate(problem.model, problem.records, holdout, findings.nuisance, findings.active)
+    return before, locate(problem.model, problem.records, holdout, outcome.nuisance, outcome.active)
 
 
-def _location(findings: Findings, opinion: Opinion) -> list[tuple[str, float]]:
+def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
     """A named effect's own places; else the places where a flexible correction of the nominal model helps.
 
     Not of the best named structure: a wrong name has bent the model where it acts.
     """
-    model, holdout, runs = findings.problem.model, findings.holdout, findings.runs
-    if opinion.verdict != "unknown" and findings.active:
-        initial = settle(model, holdout, findings.nuisance, findings.active)
+    model, holdout, runs = outcome.problem.model, outcome.holdout, outcome.runs
+    if opinion.verdict != "unknown" and outcome.active:
+        initial = settle(model, holdout, outcome.nuisance, outcome.active)
         closed = max(0.0, 1.0 - runs["best"].total / runs["refit"].total)
-        return effect_shares(model, holdout, findings.nuisance, initial, findings.active, closed)
-    before = findings.before
+        return effect_shares(model, holdout, outcome.nuisance, initial, outcome.active, closed)
+    before = outcome.before
     return [] if before is None else [(place, float(np.clip(share, 0.0, 1.0))) for place, share in before.shares]
 
 
-def _evidence(findings: Findings) -> dict[str, float]:
+def _evidence(outcome: Outcome) -> dict[str, float]:
     """Numbers the verdict rests on."""
-    chosen = findings.chosen
-    out = {"level_refit": findings.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
-    out |= {"walls": float(at_bounds(findings.problem, chosen.fit))}
-    for name, one in (("refit", findings.before), ("chosen", findings.after)):
+    chosen = outcome.chosen
+    out = {"level_refit": outcome.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    out |= {"walls": float(at_bounds(outcome.problem, chosen.fit))}
+    for name, one in (("refit", outcome.before), ("chosen", outcome.after)):
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
-    return out | {f"gap_{name}": run.total for name, run in findings.runs.items()}
+    return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 
 
 def _next_experiment(
-    findings: Findings, opinion: Opinion, group: Sequence[str], design: Callable[[Problem, Fit, Fit], Experiment | None]
+    outcome: Outcome, opinion: Opinion, group: Sequence[str], design: Callable[[Problem, Fit, Fit], Experiment | None]
 ) -> Experiment | None:
     """Split the verdict from its strongest rival."""
-    names = [(name_of(s.fit.candidate), s) for s in findings.finalists]
+    names = [(name_of(s.fit.candidate), s) for s in outcome.finalists]
     rivals = [s for name, s in names if name in group and name != opinion.verdict]
     if not rivals:
         return None
-    return design(findings.problem, findings.best, min(rivals, key=lambda s: s.level).fit)
+    return design(outcome.problem, outcome.best, min(rivals, key=lambda s: s.level).fit)
 
 
 def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:

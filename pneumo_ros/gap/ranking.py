@@ -9,10 +9,10 @@ import numpy as np
 
 from pneumo_ros.gap.compete import with_jacobian
 from pneumo_ros.gap.diagnosis import Ranked
-from pneumo_ros.gap.findings import Findings
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.held_out import bootstrap_shrink
 from pneumo_ros.gap.model import Active, Model
+from pneumo_ros.gap.outcome import Outcome
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.runs import HeldOut, held_by
 from pneumo_ros.gap.selection import Scored
@@ -20,19 +20,19 @@ from pneumo_ros.gap.uncertainty import covariance, effect_estimates
 from pneumo_ros.gap.verdict import Opinion
 
 
-def rank(findings: Findings, opinion: Opinion) -> list[Ranked]:
+def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
     """Nominal structure, unknown, and every finalist; the most probable first."""
-    problem, holdout, base, best = findings.problem, findings.holdout, findings.base, findings.best
-    refit = findings.runs["refit"]
+    problem, holdout, base, best = outcome.problem, outcome.holdout, outcome.base, outcome.best
+    refit = outcome.runs["refit"]
     fitted = problem.gap(base.residual)
     nominal = _plain(("none",), opinion.named[Candidate()], refit.total, fitted)
-    out = [replace(nominal, evidence=_weighed(findings.refit))]
+    out = [replace(nominal, evidence=_weighed(outcome.refit))]
     if opinion.unknown > 1e-3:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
-    for scored in findings.finalists:
+    for scored in outcome.finalists:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else with_jacobian(problem, scored.fit)
-        run = findings.runs["best"] if same else held_by(problem, one, holdout)
+        run = outcome.runs["best"] if same else held_by(problem, one, holdout)
         ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
         out.append(replace(ranked, evidence=_weighed(scored)))
     return sorted(out, key=lambda r: -r.probability)

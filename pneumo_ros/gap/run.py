@@ -14,8 +14,8 @@ from pneumo_ros.gap.compete import Progress
 from pneumo_ros.gap.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
 from pneumo_ros.gap.effects.base import Effect
-from pneumo_ros.gap.findings import Whereabouts
 from pneumo_ros.gap.model import Active, Array
+from pneumo_ros.gap.outcome import Whereabouts
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
 from pneumo_ros.gap.standing import library_of

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup, escape
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.report.contents import Findings, contents
@@ -18,7 +20,13 @@ def render(found: Findings) -> str:
     """The page's HTML; it refers to nothing outside itself."""
     source = resources.files(__package__).joinpath(TEMPLATE).read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["whole_options"] = whole_options
     return environment.from_string(source).render(contents(found), cold=colour(0.0), hot=colour(1.0))
+
+
+def whole_options(text: str) -> Markup:
+    """A sentence in which no line ends within an option such as --duration."""
+    return Markup(re.sub(r"--[\w-]+", r'<span class="option">\g<0></span>', str(escape(text))))
 
 
 def write_report(path: Path, found: Findings) -> None:

@@ -35,7 +35,7 @@ class Whereabouts:
 
 
 @dataclass(frozen=True)
-class Findings:
+class Outcome:
     """Structures with their scores, and the held-out log under the nominal, the re-estimated and the best of them.
 
     Attributes
