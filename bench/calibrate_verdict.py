@@ -55,7 +55,8 @@ def unknown_share(found: dict[str, Any], constants: Calibration) -> float:
 def height(weighed: dict[str, float], entry: dict[str, Any], constants: Calibration) -> float:
     """Logarithm of a structure's weight before its effects pay their toll."""
     fitted = [name for name in entry["parameters"] if "total_lag" not in name]  # that one follows from the others
-    return -constants.sharpness * (weighed["cost"] + TOLL * len(fitted)) / weighed["samples"]
+    price = weighed["cost"] + TOLL * (len(fitted) + entry["sites"].count("both"))
+    return -constants.sharpness * price / weighed["samples"]
 
 
 def named_share(label: dict[str, Any], found: dict[str, Any], constants: Calibration) -> float:
@@ -91,7 +92,7 @@ def main() -> None:
     report(cases)
     foreign = [truth(label) == "unknown" for label, _ in cases]
     loss = []
-    for leftover, held, walls in product((0.03, 0.05, 0.08, 0.12, 0.18), (0.1, 0.14, 0.18, 0.25), (1.0, 1.3, 1.9)):
+    for leftover, held, walls in product((0.03, 0.05, 0.065, 0.1, 0.18), (0.1, 0.14, 0.18, 0.25), (1.0, 1.3, 1.9)):
         c = replace(Calibration(), leftover=leftover, leftover_held=held, walls=walls)
         share = [unknown_share(found, c) if out else 1.0 - unknown_share(found, c)
                  for out, (_, found) in zip(foreign, cases, strict=True)]  # fmt: skip

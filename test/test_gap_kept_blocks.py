@@ -7,32 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.gap.compete import Effort, compete
 from pneumo_ros.gap.model import Active, Array, EffectLike, EffectParameter, Parameter, PlainEffect
 from pneumo_ros.gap.problem import BLOCK, SELECT_EVERY, Problem
 from pneumo_ros.gap.selection import Thresholds, score, select
 
-PERIOD, NOISE, RATE, STOP, BELOW = 2e-3, 1e-3, 8.0, 30.0, 1.5
+RATE, STOP, BELOW = 8.0, 30.0, 1.5
 SECONDS = 7.5  # six blocks
-
-
-@dataclass(frozen=True)
-class Record:
-    """A lag's output and what drives it."""
-
-    measured: Array
-    drive: Array
-    name: str = "lag"
-    period: float = PERIOD
-
-    @property
-    def weight(self) -> Array:
-        return np.ones_like(self.measured)
-
-    @property
-    def noise(self) -> Array:
-        return np.array([NOISE])
 
 
 EFFECTS = {
@@ -49,11 +32,11 @@ class Lag:
     parameters: tuple[Parameter, ...] = (Parameter("rate", "1/s", RATE, 0.1),)
     effects: Mapping[str, EffectLike] = field(default_factory=lambda: EFFECTS)
 
-    def initial(self, record: Record, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+    def initial(self, record: DrivenLog, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         return record.measured[:25].mean(axis=0), np.array([NOISE])
 
     def predict(
-        self, record: Record, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
     ) -> Array:
         sizes = {one.effect: one.values[0] for one in active}
         x, out = float(initial[0]), np.empty((len(record.drive), 1))
@@ -70,13 +53,13 @@ class Lag:
         return None
 
 
-def record(hit: int) -> Record:
+def record(hit: int) -> DrivenLog:
     """A small wave, and one blow that reaches the stop in block ``hit``."""
     t = PERIOD * np.arange(round(SECONDS / PERIOD))
     drive = np.sin(2.0 * np.pi * 0.9 * t)
     drive[(t > BLOCK * hit + 0.2) & (t < BLOCK * hit + 0.5)] += 3.0
-    clean = Lag().predict(Record(t, drive), np.array([RATE]), np.zeros(1), [Active("stop", "", (STOP,))])
-    return Record(clean + NOISE * np.random.default_rng(hit).normal(size=clean.shape), drive)
+    clean = Lag().predict(DrivenLog(t, drive), np.array([RATE]), np.zeros(1), [Active("stop", "", (STOP,))])
+    return DrivenLog(clean + NOISE * np.random.default_rng(hit).normal(size=clean.shape), drive)
 
 
 @pytest.mark.parametrize("hit", [2, 3, 4])

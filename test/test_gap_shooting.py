@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.compete import Effort, compete
@@ -15,28 +16,7 @@ from pneumo_ros.gap.model import Active, Array, EffectLike, Parameter
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 
-PERIOD, NOISE, TRUE_GROWTH = 2e-3, 1e-3, 1.5
-
-
-@dataclass(frozen=True)
-class Record:
-    """A measured state and the input that held it."""
-
-    measured: Array
-    pushed: Array
-    name: str = "unstable"
-    period: float = PERIOD
-
-    @property
-    def weight(self) -> Array:
-        return np.ones_like(self.measured)
-
-    @property
-    def noise(self) -> Array:
-        return np.array([NOISE])
-
-    def slice(self, first: int, last: int) -> Record:
-        return Record(self.measured[first:last], self.pushed[first:last])
+TRUE_GROWTH = 1.5
 
 
 @dataclass(frozen=True)
@@ -47,18 +27,18 @@ class Plant:
     parameters: tuple[Parameter, ...] = (Parameter("growth", "1/s", 1.0, 0.3),)
     effects: Mapping[str, EffectLike] = field(default_factory=dict)
 
-    def initial(self, record: Record, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+    def initial(self, record: DrivenLog, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         return record.measured[:25].mean(axis=0), np.array([NOISE])
 
     def predict(
-        self, record: Record, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
     ) -> Array:
         count = len(record.measured) if rows is None else rows
         grown = np.exp(nuisance[0] * PERIOD)
         out = np.empty((count, 1))
         out[0] = initial
         for i in range(count - 1):
-            out[i + 1] = grown * out[i] + (grown - 1.0) / nuisance[0] * record.pushed[i]
+            out[i + 1] = grown * out[i] + (grown - 1.0) / nuisance[0] * record.drive[i]
         return out
 
     def places(self, active: Active) -> tuple[str, ...]:
@@ -68,7 +48,7 @@ class Plant:
         return None
 
 
-def record(seconds: float) -> Record:
+def record(seconds: float) -> DrivenLog:
     """The plant held near zero by feedback from its true state, disturbed by a slow wave."""
     rng = np.random.default_rng(1)
     count = round(seconds / PERIOD)
@@ -78,7 +58,7 @@ def record(seconds: float) -> Record:
         pushed[i] = -4.0 * x[i] + np.sin(2.0 * np.pi * 0.7 * i * PERIOD)
         if i + 1 < count:
             x[i + 1] = grown * x[i] + (grown - 1.0) / TRUE_GROWTH * pushed[i]
-    return Record((x + NOISE * rng.normal(size=count))[:, None], pushed)
+    return DrivenLog((x + NOISE * rng.normal(size=count))[:, None], pushed)
 
 
 def test_windows_find_what_the_free_run_cannot() -> None:

@@ -1,0 +1,32 @@
+"""A log of any small plant: what it put out and what drove it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pneumo_ros.gap.model import Array
+
+PERIOD, NOISE = 2e-3, 1e-3
+
+
+@dataclass(frozen=True)
+class DrivenLog:
+    """One output with white noise of NOISE, no sample missing."""
+
+    measured: Array
+    drive: Array
+    name: str = "plant"
+    period: float = PERIOD
+
+    @property
+    def weight(self) -> Array:
+        return np.ones_like(self.measured)
+
+    @property
+    def noise(self) -> Array:
+        return np.array([NOISE])
+
+    def slice(self, first: int, last: int) -> DrivenLog:
+        return replace(self, measured=self.measured[first:last], drive=self.drive[first:last])
