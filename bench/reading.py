@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import Writer
 
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointEncoder, PressureEncoder
-from pneumo_ros.session.writing import interface
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
+from pneumo_ros.log.writing import interface
 
 LIMIT_SECONDS, LIMIT_MEGABYTES = 2.0, 500.0
 SAMPLE_TOPICS = (topics.ROAD, topics.DISPLACEMENT, topics.FRONT_PRESSURE, topics.REAR_PRESSURE, topics.COMMAND)
@@ -52,7 +52,7 @@ def once(path: Path, reader: str) -> None:
     """Read in a process of its own and print seconds and the most memory it held."""
     start = time.perf_counter()
     if reader == "bulk":
-        from pneumo_ros.session.reading import read_log
+        from pneumo_ros.log.reading import read_log
 
         log = read_log(path)
         count = sum(len(log.columns(name).stamp_ns) for name in log.topics)

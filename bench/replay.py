@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from pneumo_ros.session.reading import read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.session.replay import replay, warm_up
 
 LIMIT = 20.0  # times real time

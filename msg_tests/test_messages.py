@@ -13,9 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 import sessions
 
 from pneumo_ros.cli.reference import documents
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import Log, read_log
 from pneumo_ros.nodes.interfaces import message_class
-from pneumo_ros.session import topics
-from pneumo_ros.session.reading import Log, read_log
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PLAUSIBLE = {  # unit -> largest magnitude a running rig can show

@@ -8,12 +8,12 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
+from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
+from pneumo_ros.log.topics import COMMAND, DISPLACEMENT, FRONT_PRESSURE, JOINT, REAR_PRESSURE, ROAD, STRING
+from pneumo_ros.log.writing import LogWriter
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.session.cdr import JointEncoder, PressureEncoder
-from pneumo_ros.session.topics import COMMAND, DISPLACEMENT, FRONT_PRESSURE, JOINT, REAR_PRESSURE, ROAD, STRING
-from pneumo_ros.session.writing import LogWriter
 
 RATE = 500.0
 DISPLACEMENT_NOISE, PRESSURE_NOISE = 1e-5, 150.0

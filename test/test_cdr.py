@@ -11,8 +11,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import (
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import (
     JointDecoder,
     JointEncoder,
     PressureEncoder,

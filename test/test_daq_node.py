@@ -33,9 +33,9 @@ from std_srvs.srv import Trigger
 from pneumo_ros.daq.calibration import SENSORS
 from pneumo_ros.daq.calibration_file import parse_calibration
 from pneumo_ros.errors import InputError
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import Log, read_log
 from pneumo_ros.nodes.controller import ControllerNode
-from pneumo_ros.session import topics
-from pneumo_ros.session.reading import Log, read_log
 
 pytestmark = pytest.mark.realtime
 

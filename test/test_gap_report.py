@@ -22,8 +22,8 @@ from pneumo_ros.gap.report.rig_map import colour, draw_map
 from pneumo_ros.gap.report.words import confidence, headline, next_steps, place_words
 from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.reading import read_log
 
 PLACES = (
     "front_force", "rear_force", "front_air", "rear_air", "front_tyre", "rear_tyre", "body_heave", "body_pitch",

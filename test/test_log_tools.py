@@ -15,13 +15,13 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.log import app
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.comparison import compare
+from pneumo_ros.log.conformance import breaks_contract, check_conformance
+from pneumo_ros.log.inspection import inspect_log
+from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, STRING, read_log
+from pneumo_ros.log.repair import recover
+from pneumo_ros.log.tables import export
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.comparison import compare
-from pneumo_ros.session.conformance import breaks_contract, check_conformance
-from pneumo_ros.session.inspection import inspect_log
-from pneumo_ros.session.reading import FLUID_PRESSURE, JOINT_STATE, STRING, read_log
-from pneumo_ros.session.repair import recover
-from pneumo_ros.session.tables import export
 
 PERIOD = 2_000_000
 VALVES = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")

@@ -15,9 +15,9 @@ from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.layouts import layout_of
+from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, STRING, Log, read_log
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.layouts import layout_of
-from pneumo_ros.session.reading import FLUID_PRESSURE, JOINT_STATE, STRING, Log, read_log
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 NAMES = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear")

@@ -21,13 +21,13 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.replay import app
 from pneumo_ros.errors import InputError
-from pneumo_ros.session import topics
-from pneumo_ros.session.comparison import same_payload
-from pneumo_ros.session.reading import Log, read_log
-from pneumo_ros.session.records import Records
+from pneumo_ros.log import topics
+from pneumo_ros.log.comparison import same_payload
+from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.records import Records
+from pneumo_ros.log.rewriting import write_log
 from pneumo_ros.session.replay import replay
 from pneumo_ros.session.rerun import compare_channels, rerun
-from pneumo_ros.session.rewriting import write_log
 from pneumo_ros.session.transport import SECOND, Transport
 from pneumo_ros.session.what_if import CAVEAT
 

@@ -9,8 +9,8 @@ import pytest
 from test_reading import session, write
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.reading import Log, read_log
-from pneumo_ros.session.salvage import salvage
+from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.salvage import salvage
 
 CUTS, FLIPS = 1000, 1000
 

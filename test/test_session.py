@@ -14,8 +14,8 @@ import yaml
 from mcap_ros2.reader import read_ros2_messages
 from rosbags.highlevel import AnyReader
 
-from pneumo_ros.session import topics
-from pneumo_ros.session.reading import read_log
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import read_log
 
 DURATION = 3.0
 SAMPLES = 1501

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumo_ros.session.reading import read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.twin.case import bench, made, simulated
 from pneumo_ros.twin.draw import WIDEST, drawn_rig, scenes
 from pneumo_ros.twin.excitation import ROADS

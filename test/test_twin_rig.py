@@ -25,11 +25,11 @@ from pneumo_ros.gap.saved_rig import corrected_rig, save_corrected_rig
 from pneumo_ros.gap.signals import Signals, check_pair
 from pneumo_ros.gap.stepped import stepped_rig
 from pneumo_ros.gap.twin_rig import TwinRig, diagnosed_rig
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.stepping import PlainRig, SteppedRig
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import NamedEffect, Rig, load_rig, parse_rig
 from pneumo_ros.road import build_road
-from pneumo_ros.session.reading import read_log
 from pneumo_ros.session.rerun import compare_channels, rerun
 
 LIBRARY = load_library()

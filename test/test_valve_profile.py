@@ -14,11 +14,11 @@ from pneumo_ros.control.half_car import CONTROLLERS, build_controller
 from pneumo_ros.control.profile import ProfilePlayer, build_commander
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import ROAD_FILE, VALVE_FILE, Experiment
+from pneumo_ros.log.inspection import read_setups
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import build_road
-from pneumo_ros.session.inspection import read_setups
-from pneumo_ros.session.reading import read_log
 from pneumo_ros.session.replay import replay
 from pneumo_ros.valve_profile import ValveProfile, read_profile
 

@@ -13,10 +13,10 @@ from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointEncoder
-from pneumo_ros.session.chunks import ChunkedWriter
-from pneumo_ros.session.writing import AT_LATEST, AT_STAMP, CHUNK_BYTES, FREE_BYTES_NEEDED, LogWriter
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointEncoder
+from pneumo_ros.log.chunks import ChunkedWriter
+from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, CHUNK_BYTES, FREE_BYTES_NEEDED, LogWriter
 
 MESSAGES = [(1 + i % 3, 1_000 + 7 * i, bytes([i % 251]) * (20 + i % 90)) for i in range(9_000)]
 

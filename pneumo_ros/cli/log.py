@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from pneumo_ros.session.comparison import Comparison
-    from pneumo_ros.session.inspection import Report, TopicReport
-    from pneumo_ros.session.repair import Recovery
-    from pneumo_ros.session.salvage import Salvaged
+    from pneumo_ros.log.comparison import Comparison
+    from pneumo_ros.log.inspection import Report, TopicReport
+    from pneumo_ros.log.repair import Recovery
+    from pneumo_ros.log.salvage import Salvaged
 
 app = typer.Typer(
     add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
@@ -38,8 +38,8 @@ FINDINGS_EXIT = 1
 @app.command()
 def info(log: LogPath, as_json: AsJson = False) -> None:
     """What a log holds: topics, rates, gaps, jitter, clock jumps, rig, parameters, versions, events."""
-    from pneumo_ros.session.inspection import inspect_log
-    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.log.inspection import inspect_log
+    from pneumo_ros.log.reading import read_log
 
     report = inspect_log(read_log(log))
     if as_json:
@@ -51,8 +51,8 @@ def info(log: LogPath, as_json: AsJson = False) -> None:
 @app.command()
 def validate(log: LogPath, as_json: AsJson = False) -> None:
     """Does the log keep the contract? One line a finding; exit code 1 if it does not."""
-    from pneumo_ros.session.conformance import breaks_contract, check_conformance
-    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.log.conformance import breaks_contract, check_conformance
+    from pneumo_ros.log.reading import read_log
 
     findings = check_conformance(read_log(log))
     if as_json:
@@ -73,7 +73,7 @@ def recover(
     overwrite: Overwrite = False,
 ) -> None:
     """Make a readable log of a truncated or corrupted one, and say what was lost."""
-    from pneumo_ros.session.repair import recover as recover_log
+    from pneumo_ros.log.repair import recover as recover_log
 
     _show_recovery(recover_log(log, output, overwrite))
 
@@ -87,8 +87,8 @@ def export(
     overwrite: Overwrite = False,
 ) -> None:
     """Write topics as tables for pandas: log_time_ns, stamp_ns and one column a channel, SI units."""
-    from pneumo_ros.session.reading import read_log
-    from pneumo_ros.session.tables import export as export_tables
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.log.tables import export as export_tables
 
     for path in export_tables(read_log(log), output, kind, topic, overwrite):
         console.print(str(path), highlight=False, soft_wrap=True)
@@ -101,8 +101,8 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Two logs side by side: topics, settings, and the difference of every signal at equal times."""
-    from pneumo_ros.session.comparison import compare as compare_logs
-    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.log.comparison import compare as compare_logs
+    from pneumo_ros.log.reading import read_log
 
     result = compare_logs(read_log(first), read_log(second))
     if as_json:
@@ -120,7 +120,7 @@ def report(
 ) -> None:
     """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
     from pneumo_ros.cli.passive import passive_run
-    from pneumo_ros.session.reading import read_log
+    from pneumo_ros.log.reading import read_log
     from pneumo_ros.session.report import write_report
     from pneumo_ros.session.summary import load_session
 
@@ -209,7 +209,7 @@ def _show_events(report: Report) -> None:
 
 
 def _show_recovery(result: Recovery) -> None:
-    from pneumo_ros.session.repair import describe
+    from pneumo_ros.log.repair import describe
 
     found = result.salvaged
     console.print(f"{result.output}: {result.kept} messages kept, {_lost(found)}", highlight=False, soft_wrap=True)

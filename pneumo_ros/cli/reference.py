@@ -8,13 +8,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
+from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
 from pneumo_ros.session.dashboard.viewer_layouts import LAYOUTS
-from pneumo_ros.session.topics import topics_table
 
 TOPICS_HEAD = """# Topics
 
-Made from the table in `pneumo_ros/session/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
+Made from the table in `pneumo_ros/log/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
 the instant its values hold. `JointState` is used as the stamped, named standard message: its `position` holds the value
 in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position. On
 hardware (`pneumo run --source serial`) the node `daq` takes the place of `plant`: it publishes what the sensors of the

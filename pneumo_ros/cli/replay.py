@@ -17,8 +17,8 @@ from rich.table import Table
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
+    from pneumo_ros.log.reading import Log
     from pneumo_ros.rig import Rig
-    from pneumo_ros.session.reading import Log
     from pneumo_ros.session.replay import Replayed
     from pneumo_ros.session.rerun import Rerun
     from pneumo_ros.session.what_if import Row
@@ -66,7 +66,7 @@ def replay(
     domain_id: Annotated[int | None, typer.Option(help="Live: DDS domain.", min=0, max=232)] = None,
 ) -> None:
     """Replay a log. Live by default: its inputs are published again, with /clock, for nodes that run beside it."""
-    from pneumo_ros.session.salvage import read_or_salvage
+    from pneumo_ros.log.salvage import read_or_salvage
 
     found, remark = read_or_salvage(log)
     if remark:
@@ -119,9 +119,9 @@ def _believed(log: Log, path: Path | None) -> Rig | None:
 def _stepped(
     log: Log, overrides: Mapping[str, Mapping[str, Any]], rig: Rig | None, output: Path | None, plot: Path | None
 ) -> None:
+    from pneumo_ros.log.rewriting import refuse_target, write_log
     from pneumo_ros.session.replay import replay as step
     from pneumo_ros.session.replay import replayed_log, warm_up
-    from pneumo_ros.session.rewriting import refuse_target, write_log
 
     if output is not None:
         refuse_target(output, log.path)
@@ -227,8 +227,8 @@ def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path,
     """On the rig as diagnosed; ``rig`` is the one that the diagnosis was told, if it was told one."""
     from pneumo_ros.gap.closed_loop import rerun_diagnosed
     from pneumo_ros.gap.signals import read_signals
+    from pneumo_ros.log.inspection import read_setups, seed_of
     from pneumo_ros.rig import load_rig
-    from pneumo_ros.session.inspection import read_setups, seed_of
     from pneumo_ros.session.replay import plan
 
     try:

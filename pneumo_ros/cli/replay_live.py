@@ -18,9 +18,9 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 from rich.console import Console
 
+from pneumo_ros.log.reading import Log
 from pneumo_ros.nodes.replay import Player, spinning, transport_of
 from pneumo_ros.nodes.spin import SignalStop
-from pneumo_ros.session.reading import Log
 
 DISCOVERY = 1.0  # s for subscribers to find the publishers before the first message
 KEYS = "space: pause/go on   . : one sample   , / ; : 1 s back/ahead   + - : faster/slower   q: end"

@@ -286,7 +286,7 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
 
 def _save_what_is_left(target: Path) -> None:
     """Say where the log is; if its recorder died, make a readable one of what it had written."""
-    from pneumo_ros.session.repair import recover
+    from pneumo_ros.log.repair import recover
 
     out = Console(stderr=True, highlight=False, soft_wrap=True)
     part = target.with_name(target.name + ".part")
@@ -322,7 +322,7 @@ def _report(console: Console, target: Path, values: Values, picture: bool, page:
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}")
     if page:
-        from pneumo_ros.session.reading import read_log
+        from pneumo_ros.log.reading import read_log
         from pneumo_ros.session.report import write_report
 
         html = target.with_suffix(".html")

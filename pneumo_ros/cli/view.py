@@ -48,10 +48,10 @@ def view(
 
 def view_log(path: Path, host: str, port: int, token: str | None) -> None:
     """Play a log back; each browser tab has its own position."""
+    from pneumo_ros.log.salvage import read_or_salvage
     from pneumo_ros.session.dashboard.page import Page
     from pneumo_ros.session.dashboard.server import serve
     from pneumo_ros.session.dashboard.source import Playback
-    from pneumo_ros.session.salvage import read_or_salvage
 
     log, remark = read_or_salvage(path)
     if remark:

@@ -27,13 +27,13 @@ from std_msgs.msg import String
 
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.stages import continues
 from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import LoopTiming
-from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
 COMMON: tuple[Parameter, ...] = (

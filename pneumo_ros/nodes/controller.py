@@ -15,12 +15,12 @@ from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.profile import Commander, ProfilePlayer, build_commander
 from pneumo_ros.daq.safety_config import load_safety
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointDecoder, JointEncoder
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointDecoder, JointEncoder
 
 PARAMETERS: tuple[Parameter, ...] = (
     *CONTROL_PARAMETERS,

@@ -23,6 +23,8 @@ from pneumo_ros.daq.reasons import Event, Level
 from pneumo_ros.daq.report import LinkReport
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.errors import InputError
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointDecoder
 from pneumo_ros.nodes.base import ERROR, OK, WARN, RigNode
 from pneumo_ros.nodes.daq_output import MeasurementOutput, WallClock
 from pneumo_ros.nodes.daq_services import RigServices
@@ -30,8 +32,6 @@ from pneumo_ros.nodes.daq_session import SessionCourse
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointDecoder
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("port", "/dev/ttyACM0", "", "serial port of the board, or a link to it", read_only=True),

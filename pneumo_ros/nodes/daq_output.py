@@ -6,10 +6,10 @@ import time
 
 from pneumo_ros.daq.frames import DeviceState
 from pneumo_ros.daq.intake import Measurement
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
 from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.rig import Rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointEncoder, PressureEncoder
 
 SLEW_NS = 400_000  # ns the mapping to ROS time may move a second; less than a sample, so stamps never run back
 STEP_NS = 100_000_000  # ns: more than slewing accounts for; somebody set the clock

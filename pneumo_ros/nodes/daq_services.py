@@ -14,10 +14,10 @@ from pneumo_ros.daq.calibration_file import calibration_to_yaml, save_calibratio
 from pneumo_ros.daq.driver import SerialDriver
 from pneumo_ros.daq.field_calibration import Point, span, zero
 from pneumo_ros.errors import InputError
+from pneumo_ros.log import topics
 from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE, TRIP_SERVICE
 from pneumo_ros.rig import Rig
-from pneumo_ros.session import topics
 
 ZERO_SERVICE, SPAN_SERVICE = "/rig/zero", "/rig/span"
 SAMPLES = 500  # averaged for zero and span; Appendix C took 100 readings

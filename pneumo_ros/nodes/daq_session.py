@@ -10,8 +10,8 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import String
 
 from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.log.topics import READY
 from pneumo_ros.nodes.base import ERROR, OK
-from pneumo_ros.session.topics import READY
 
 if TYPE_CHECKING:
     from pneumo_ros.nodes.daq import DaqNode

@@ -22,18 +22,18 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointDecoder, decode_pressure
+from pneumo_ros.log.inspection import Event
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE, TRIP_SERVICE
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos
 from pneumo_ros.nodes.spin import SPIN_TIMEOUT, make_executor
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig, load_rig, parse_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointDecoder, decode_pressure
 from pneumo_ros.session.dashboard.panels import SHOWN, Samples
 from pneumo_ros.session.dashboard.ring import Ring
 from pneumo_ros.session.dashboard.source import Control, Status
-from pneumo_ros.session.inspection import Event
 
 NODE_NAME = "dashboard"
 QUIET = 1.5  # s without a sample after which the session is taken to be over or not there

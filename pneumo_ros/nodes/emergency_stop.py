@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from std_srvs.srv import Trigger
 
+from pneumo_ros.log.topics import ESTOP
 from pneumo_ros.nodes.base import ERROR, OK, RigNode
-from pneumo_ros.session.topics import ESTOP
 
 TRIP_SERVICE, RESET_SERVICE = "/rig/estop_trip", "/rig/estop_reset"
 _FLAG = 4  # offset of the bool in a serialised std_msgs/Bool

@@ -9,12 +9,12 @@ import numpy as np
 from rclpy.context import Context
 
 from pneumo_ros.estimation.half_car import PARAMETERS, Estimator, EstimatorState, build_estimator
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointDecoder, JointEncoder, decode_pressure
 from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointDecoder, JointEncoder, decode_pressure
 
 
 class EstimatorNode(RigNode):

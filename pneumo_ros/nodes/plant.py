@@ -11,6 +11,8 @@ from rclpy.context import Context
 from std_msgs.msg import String
 
 from pneumo_ros.gap.stepped import stepped_rig
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
 from pneumo_ros.nodes.base import OK, RigNode
 from pneumo_ros.nodes.emergency_stop import EmergencyStop
 from pneumo_ros.nodes.spin import node_main
@@ -18,8 +20,6 @@ from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.plant.sensors import NoiseSource
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
 from pneumo_ros.session.timing import Deadlines
 
 SECOND = 1_000_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 import yaml
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from pneumo_ros.session.topics import BY_NAME, Flow
+from pneumo_ros.log.topics import BY_NAME, Flow
 
 RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
 

@@ -9,13 +9,13 @@ import numpy as np
 from rclpy.context import Context
 from std_msgs.msg import String
 
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointEncoder, stamp_of
 from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import PARAMETERS, build_road
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointEncoder, stamp_of
 
 BLOCK = 1024  # samples computed at once
 LEAD = 16  # samples ahead of the clock, which ticks every few periods only (plant: clock_every)

@@ -13,15 +13,15 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.provenance import versions
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, STRING, TOPICS, Topic
+from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 from pneumo_ros.nodes.base import WARN, RigNode
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.provenance import versions
 from pneumo_ros.session.supervisor import END_REASON
-from pneumo_ros.session.topics import DIAGNOSTIC, EVENTS, STRING, TOPICS, Topic
-from pneumo_ros.session.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 
 DRAIN_LIMIT = 5.0  # s
 QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
@@ -33,7 +33,7 @@ PARAMETERS: tuple[Parameter, ...] = (
 
 
 class SessionRecorderNode(RigNode):
-    """Thin shell over :mod:`pneumo_ros.session.writing`."""
+    """Thin shell over :mod:`pneumo_ros.log.writing`."""
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         super().__init__("session_recorder", PARAMETERS, context=context, overrides=overrides)

@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
+from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import JointEncoder
+from pneumo_ros.log.inspection import Setup, read_setups
+from pneumo_ros.log.reading import Log, TopicInfo
+from pneumo_ros.log.records import Records
+from pneumo_ros.log.topics import Topic
+from pneumo_ros.log.writing import interface
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.cdr import JointEncoder
-from pneumo_ros.session.inspection import Setup, read_setups
-from pneumo_ros.session.reading import Log, TopicInfo
-from pneumo_ros.session.records import Records
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage, continues
-from pneumo_ros.session.topics import Topic
-from pneumo_ros.session.writing import interface
 
 TABLES: dict[str, tuple[Parameter, ...]] = {"estimator": ESTIMATION_PARAMETERS, "controller": CONTROL_PARAMETERS}
 ALIASES = {"lambda": "pole"}  # the thesis's letter for the triple pole

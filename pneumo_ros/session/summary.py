@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from pneumo_ros.comfort import Ride, judge
 from pneumo_ros.errors import InputError
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import Joint, Log, read_log
 from pneumo_ros.rig import Rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.reading import Joint, Log, read_log
 from pneumo_ros.units import GRAVITY
 
 SETTLED = 1.0  # s; figures of ride and estimate leave out the start before it

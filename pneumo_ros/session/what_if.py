@@ -13,10 +13,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from pneumo_ros.log import topics
+from pneumo_ros.log.topics import Topic
 from pneumo_ros.rig import Rig
-from pneumo_ros.session import topics
 from pneumo_ros.session.replay import Replayed, Track
-from pneumo_ros.session.topics import Topic
 
 CAVEAT = "The plant does not react: measurements are the recorded ones; how the rig would have moved is not shown."
 NEAR_LIMIT = 1e-9  # of the valve's range: a command this close to an end is saturated

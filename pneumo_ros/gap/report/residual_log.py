@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals
-from pneumo_ros.session.cdr import JointEncoder, PressureEncoder
-from pneumo_ros.session.topics import (
+from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
+from pneumo_ros.log.topics import (
     COMMAND,
     DISPLACEMENT,
     FRONT_PRESSURE,
@@ -26,7 +26,7 @@ from pneumo_ros.session.topics import (
     ROAD,
     STRING,
 )
-from pneumo_ros.session.writing import Channel, LogWriter
+from pneumo_ros.log.writing import Channel, LogWriter
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.prepare import DISPLACEMENT, PRESSURE, ROAD, VALVE, prepare
 from pneumo_ros.gap.signals.types import Signals, TopicData
+from pneumo_ros.log.reading import CONFIG_TOPIC, Log, read_log
 from pneumo_ros.rig import Rig, parse_rig
-from pneumo_ros.session.reading import CONFIG_TOPIC, Log, read_log
 
 
 def read_signals(path: str | Path, rig: Rig | None = None) -> Signals:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.log import topics
+from pneumo_ros.log.topics import Topic
 from pneumo_ros.rig import Rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.topics import Topic
 from pneumo_ros.units import DEGREE
 
 MOTION, TYRES = "derived/motion", "derived/tyres"

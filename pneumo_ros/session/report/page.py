@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.reading import Log
+from pneumo_ros.log.reading import Log
 from pneumo_ros.session.report.contents import contents
 from pneumo_ros.session.summary import Recorded
 

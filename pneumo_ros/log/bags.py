@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.container import (
+from pneumo_ros.log.container import (
     Contents,
     DamageError,
     check_magic,
@@ -17,7 +17,7 @@ from pneumo_ros.session.container import (
     read_blocks,
     read_header,
 )
-from pneumo_ros.session.records import Gathered, Records, gather
+from pneumo_ros.log.records import Gathered, Records, gather
 
 PROFILE = "ros2"
 
@@ -85,7 +85,7 @@ def read_parts(path: Path, topics: Sequence[str] | None) -> list[Part]:
     Raises
     ------
     InputError
-        see :func:`pneumo_ros.session.reading.read_log`.
+        see :func:`pneumo_ros.log.reading.read_log`.
     """
     return [read_part(file, topics) for file in files_of(path)]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from pneumo_ros.session.rewriting import refuse_target, write_log
-from pneumo_ros.session.salvage import Loss, Salvaged, salvage
+from pneumo_ros.log.rewriting import refuse_target, write_log
+from pneumo_ros.log.salvage import Loss, Salvaged, salvage
 
 
 @dataclass(frozen=True)

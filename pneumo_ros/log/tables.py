@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.reading import JOINT_STATE, Columns, Joint, Log
+from pneumo_ros.log.reading import JOINT_STATE, Columns, Joint, Log
 
 Table = dict[str, NDArray[Any]]
 
@@ -70,7 +70,7 @@ def export(
 
     Parameters
     ----------
-    log : from :func:`pneumo_ros.session.reading.read_log`
+    log : from :func:`pneumo_ros.log.reading.read_log`
     folder : created if missing
     kind : csv, or parquet (needs pyarrow)
     topics : all by default

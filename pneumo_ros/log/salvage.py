@@ -18,8 +18,8 @@ from mcap.opcode import Opcode
 from mcap.records import Footer, Header
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.bags import PROFILE, Part, files_of
-from pneumo_ros.session.container import (
+from pneumo_ros.log.bags import PROFILE, Part, files_of
+from pneumo_ros.log.container import (
     FOOTER_LENGTH,
     FRAME,
     MAGIC,
@@ -34,8 +34,8 @@ from pneumo_ros.session.container import (
     parse,
     take_record,
 )
-from pneumo_ros.session.reading import Log, assemble, read_log
-from pneumo_ros.session.records import Gathered, gather
+from pneumo_ros.log.reading import Log, assemble, read_log
+from pneumo_ros.log.records import Gathered, gather
 
 # A record starts with its opcode and a length; none here is 4 GiB long, so the upper half of the length is zero.
 _START = re.compile(rb"[\x01-\x0f].{4}\x00\x00\x00\x00", re.DOTALL)

@@ -10,9 +10,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import CONFIG_TOPIC, Log
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session import topics
-from pneumo_ros.session.reading import CONFIG_TOPIC, Log
 
 SECOND = 1e9  # ns
 GAP_FACTOR = 1.5  # a pause longer than this many periods is a gap: half way to one missed sample

@@ -10,8 +10,8 @@ from mcap.writer import Writer
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.bags import PROFILE
-from pneumo_ros.session.reading import Log
+from pneumo_ros.log.bags import PROFILE
+from pneumo_ros.log.reading import Log
 
 CHUNK_BYTES = 192 * 1024  # as the recorder's
 

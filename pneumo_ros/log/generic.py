@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.session.layouts import Text, UnfitError
+from pneumo_ros.log.layouts import Text, UnfitError
 
 JOINT_FIELDS = ("position", "velocity", "effort")
 

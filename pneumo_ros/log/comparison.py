@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.session.inspection import final_parameters
-from pneumo_ros.session.reading import CONFIG_TOPIC, Log
-from pneumo_ros.session.tables import Table, table
+from pneumo_ros.log.inspection import final_parameters
+from pneumo_ros.log.reading import CONFIG_TOPIC, Log
+from pneumo_ros.log.tables import Table, table
 
 _KEYS = ("log_time_ns", "stamp_ns")
 

@@ -15,7 +15,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from pneumo_ros.session.container import FRAME, SMALL, Block, Contents, DamageError, take_record
+from pneumo_ros.log.container import FRAME, SMALL, Block, Contents, DamageError, take_record
 
 # A Message record's fixed part: opcode, length, then channel, sequence, log and publish time (MCAP specification).
 HEAD = np.dtype([

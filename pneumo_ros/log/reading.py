@@ -7,7 +7,7 @@
     rig = log.config
 
 A log is an MCAP file or a bag folder (split files with metadata.yaml). Decoding is lazy and in
-bulk: see :mod:`pneumo_ros.session.records` and :mod:`pneumo_ros.session.layouts`; messages that do not fit are
+bulk: see :mod:`pneumo_ros.log.records` and :mod:`pneumo_ros.log.layouts`; messages that do not fit are
 deserialised one by one by ``rosbags``, with equal results. Nothing here needs ROS.
 """
 
@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.bags import Part, read_parts
+from pneumo_ros.log.generic import columns_of, joints_of
+from pneumo_ros.log.layouts import Text, UnfitError, decode, layout_of, type_store
+from pneumo_ros.log.records import Records, join
 from pneumo_ros.rig import Rig, parse_rig
-from pneumo_ros.session.bags import Part, read_parts
-from pneumo_ros.session.generic import columns_of, joints_of
-from pneumo_ros.session.layouts import Text, UnfitError, decode, layout_of, type_store
-from pneumo_ros.session.records import Records, join
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"

@@ -20,8 +20,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
-from pneumo_ros.session.cdr import stamp_of
-from pneumo_ros.session.chunks import ChunkedWriter
+from pneumo_ros.log.cdr import stamp_of
+from pneumo_ros.log.chunks import ChunkedWriter
 
 CHUNK_BYTES = 192 * 1024  # the writer closes a chunk after the message that exceeds this; every one stays below 256 KiB
 FREE_BYTES_NEEDED = 64 * 1024 * 1024  # below this the file is finished while there is room for its index

@@ -1,0 +1,1 @@
+"""Session logs: MCAP and bags read, checked, repaired, converted, compared and written; knows no ROS graph."""
