@@ -24,7 +24,7 @@ from simulated_rig import Bench
 from pneumo_ros.comfort import rms
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.daq.board import board_identity
+from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig

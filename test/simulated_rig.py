@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.daq.board import board_identity
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import DriverCore
-from pneumo_ros.daq.device import Device
+from pneumo_ros.daq.emulator.board import board_identity
+from pneumo_ros.daq.emulator.device import Device
+from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
 from pneumo_ros.daq.frames import DeviceState, Hello
 from pneumo_ros.daq.intake import Measurement
 from pneumo_ros.daq.reasons import Event, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig, load_safety
-from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import Road, build_road
 

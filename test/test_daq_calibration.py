@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumo_ros.daq.board import board_identity
 from pneumo_ros.daq.calibration import SENSORS, VALVES
 from pneumo_ros.daq.calibration_check import check_calibration, resolution
 from pneumo_ros.daq.calibration_file import calibration_to_yaml, load_calibration, parse_calibration
 from pneumo_ros.daq.calibration_fit import fit_points, read_points
+from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.frames import Channel, InputRange, Valve
 from pneumo_ros.daq.scaling import check_map, input_scale, output_scale
 from pneumo_ros.errors import InputError

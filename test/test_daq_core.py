@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 from simulated_rig import MS, RIG, SAFE, START, Bench
 
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.daq.board import board_identity
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import DriverCore, Phase
-from pneumo_ros.daq.device import Device
+from pneumo_ros.daq.emulator.board import board_identity
+from pneumo_ros.daq.emulator.device import Device
 from pneumo_ros.daq.frames import DeviceState, OutputRange, encode
 from pneumo_ros.daq.intake import Measurement
 from pneumo_ros.daq.limits import MEASURED, LimitMonitor

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pneumo_ros.daq import frames
-from pneumo_ros.daq.device import Device
+from pneumo_ros.daq.emulator.device import Device
 from pneumo_ros.daq.frames import Command, CommandFlag, FrameError, Kind, Record, Reject, Sample, decode, encode
 from pneumo_ros.daq.stream import StreamDecoder
 

@@ -28,15 +28,15 @@ from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
+from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
+from pneumo_ros.dashboard.ring import Ring
+from pneumo_ros.dashboard.server import is_loopback
+from pneumo_ros.dashboard.source import Playback
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import read_events
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.dashboard.panels import MOTION, TYRES, Samples, derive, thin
-from pneumo_ros.session.dashboard.ring import Ring
-from pneumo_ros.session.dashboard.server import is_loopback
-from pneumo_ros.session.dashboard.source import Playback
 
 pytestmark = pytest.mark.realtime
 

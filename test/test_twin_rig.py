@@ -10,9 +10,9 @@ import pytest
 from rig_logs import signals_of, simulated
 from sessions import run
 
-from pneumo_ros.daq.board import board_identity
 from pneumo_ros.daq.calibration_file import load_calibration
-from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
+from pneumo_ros.daq.emulator.board import board_identity
+from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
 from pneumo_ros.errors import InputError, PneumoError
 from pneumo_ros.gap.diagnose import Options
 from pneumo_ros.gap.diagnosis import Diagnosis, Estimate, Gap

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
+from pneumo_ros.dashboard.viewer_layouts import LAYOUTS, recorded_panels
 from pneumo_ros.log import topics
-from pneumo_ros.session.dashboard.viewer_layouts import LAYOUTS, recorded_panels
 
 FOLDER = Path(__file__).resolve().parents[1] / "config" / "layouts"
 

@@ -101,9 +101,9 @@ def _plot(fits: list[Fit], path: Path) -> None:
 
 
 def _check(name: str, adc_bits: int, adc_range: float) -> None:
-    from pneumo_ros.daq.board import board_identity
     from pneumo_ros.daq.calibration_check import check_calibration
     from pneumo_ros.daq.calibration_file import load_calibration
+    from pneumo_ros.daq.emulator.board import board_identity
 
     hello = board_identity(adc_bits=adc_bits, input_volts=(-adc_range, adc_range))
     findings = check_calibration(load_calibration(name), hello)

@@ -44,12 +44,12 @@ def emulate(
 
     from rich.console import Console
 
-    from pneumo_ros.daq.board import board_identity
     from pneumo_ros.daq.calibration_file import load_calibration
-    from pneumo_ros.daq.emulator import Emulator
-    from pneumo_ros.daq.faults import parse_fault
+    from pneumo_ros.daq.emulator.board import board_identity
+    from pneumo_ros.daq.emulator.emulator import Emulator
+    from pneumo_ros.daq.emulator.faults import parse_fault
+    from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
     from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
-    from pneumo_ros.daq.simulation import RigSimulation, SimulationSettings
     from pneumo_ros.gap.stepped import stepped_rig
     from pneumo_ros.rig import load_rig
 
@@ -94,7 +94,7 @@ def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
 
 
 def _show_faults(console: Console) -> None:
-    from pneumo_ros.daq.faults import DEFAULTS, MEANING, PULSES
+    from pneumo_ros.daq.emulator.faults import DEFAULTS, MEANING, PULSES
 
     for kind, options in DEFAULTS.items():
         defaults = ",".join(f"{key}={value}" for key, value in options.items())

@@ -8,9 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
+from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
 from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
-from pneumo_ros.session.dashboard.viewer_layouts import LAYOUTS
 
 TOPICS_HEAD = """# Topics
 

@@ -48,10 +48,10 @@ def view(
 
 def view_log(path: Path, host: str, port: int, token: str | None) -> None:
     """Play a log back; each browser tab has its own position."""
+    from pneumo_ros.dashboard.page import Page
+    from pneumo_ros.dashboard.server import serve
+    from pneumo_ros.dashboard.source import Playback
     from pneumo_ros.log.salvage import read_or_salvage
-    from pneumo_ros.session.dashboard.page import Page
-    from pneumo_ros.session.dashboard.server import serve
-    from pneumo_ros.session.dashboard.source import Playback
 
     log, remark = read_or_salvage(path)
     if remark:
@@ -64,9 +64,9 @@ def view_log(path: Path, host: str, port: int, token: str | None) -> None:
 
 def view_live(host: str, port: int, token: str | None, domain_id: int | None) -> None:
     """Show the session that runs on a DDS domain, with its gains and the emergency stop."""
+    from pneumo_ros.dashboard.page import Page
+    from pneumo_ros.dashboard.server import serve
     from pneumo_ros.nodes.dashboard_link import LiveLink
-    from pneumo_ros.session.dashboard.page import Page
-    from pneumo_ros.session.dashboard.server import serve
 
     with LiveLink(domain_id) as link:
         dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)

@@ -21,6 +21,9 @@ from rclpy.task import Future
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
+from pneumo_ros.dashboard.panels import SHOWN, Samples
+from pneumo_ros.dashboard.ring import Ring
+from pneumo_ros.dashboard.source import Control, Status
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, decode_pressure
@@ -31,9 +34,6 @@ from pneumo_ros.nodes.qos import publisher_qos
 from pneumo_ros.nodes.spin import SPIN_TIMEOUT, make_executor
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig, load_rig, parse_rig
-from pneumo_ros.session.dashboard.panels import SHOWN, Samples
-from pneumo_ros.session.dashboard.ring import Ring
-from pneumo_ros.session.dashboard.source import Control, Status
 
 NODE_NAME = "dashboard"
 QUIET = 1.5  # s without a sample after which the session is taken to be over or not there

@@ -24,8 +24,8 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
-from pneumo_ros.session.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
-from pneumo_ros.session.dashboard.source import Control, Controls, Playback, Source, Status
+from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
+from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
 
 REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
 WINDOW = 10.0  # s shown

@@ -8,12 +8,12 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from pneumo_ros.dashboard.panels import SHOWN, Samples
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import Event, read_events
 from pneumo_ros.log.reading import JOINT_STATE, Log
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.session.dashboard.panels import SHOWN, Samples
 
 State = Literal["playing", "paused", "live", "waiting", "ended"]
 

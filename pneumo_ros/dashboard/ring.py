@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.session.dashboard.panels import Samples
+from pneumo_ros.dashboard.panels import Samples
 
 RESTART_NS = 1_000_000_000  # a safe command in between may carry a later stamp than the command that follows it
 CAPACITY = 60_000  # samples a topic: 30 s at 2 kHz, 2 min at 500 Hz

@@ -20,11 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pneumo_ros.daq.device import Device
-from pneumo_ros.daq.faults import Fault, NoisyLine
+from pneumo_ros.daq.emulator.device import Device
+from pneumo_ros.daq.emulator.faults import Fault, NoisyLine
+from pneumo_ros.daq.emulator.record import EmulatorRecord
+from pneumo_ros.daq.emulator.simulation import RigSimulation
 from pneumo_ros.daq.frames import DeviceState, Hello
-from pneumo_ros.daq.record import EmulatorRecord
-from pneumo_ros.daq.simulation import RigSimulation
 from pneumo_ros.errors import InputError
 
 SECOND = 1_000_000_000  # ns

@@ -11,8 +11,8 @@ import json
 from typing import Any
 from xml.etree import ElementTree
 
+from pneumo_ros.dashboard.panels import FRONT, PANELS, REAR, Line, Panel
 from pneumo_ros.log import topics
-from pneumo_ros.session.dashboard.panels import FRONT, PANELS, REAR, Line, Panel
 
 TAB = "half-car rig"
 _RAW = (

@@ -1,0 +1,1 @@
+"""The rig behind a pseudo-terminal: firmware rules, converters, faults and the simulated plant; no hardware needed."""
