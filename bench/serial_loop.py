@@ -21,12 +21,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 from serial_rig import PERIOD, Loop, SerialRig
 from simulated_rig import Bench
 
-from pneumo_ros.comfort import rms
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.ride.comfort import rms
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import build_road
 

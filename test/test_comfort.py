@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pneumo_ros.comfort_limits import (
+from pneumo_ros.thesis.comfort_limits import (
     Bands,
     healey,
     iso_1972_limit,

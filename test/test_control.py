@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pneumo_ros.comfort import mean_personal_rating, rms, tyre_load_variation
 from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import CONTROLLERS, PARAMETERS, Controller, build_controller, control_half_car
 from pneumo_ros.control.laws.common import Error, Gains, saturation
@@ -20,6 +19,7 @@ from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.plant.air_spring import effective_area
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import Trim, nominal_half_car
+from pneumo_ros.ride.comfort import mean_personal_rating, rms, tyre_load_variation
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.road import RoadSpec, make_road
 from pneumo_ros.units import GRAVITY, INCH, SQUARE_INCH

@@ -7,9 +7,9 @@ import pytest
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.half_car import HalfCar
-from pneumo_ros.plant.quarter_car import constant_area_surface, quarter_car
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
+from pneumo_ros.thesis.models.quarter_car import constant_area_surface, quarter_car
 from pneumo_ros.units import GRAVITY, SQUARE_INCH
 
 

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.plant.conventional import Conventional, simulate_conventional
 from pneumo_ros.plant.half_car import HalfCar
-from pneumo_ros.plant.similar_systems import half_rates, rig_car, simulate
-from pneumo_ros.plant.similitude import (
+from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.rig import load_rig
+from pneumo_ros.thesis.chapter3 import PRINTED, in_words, read_car
+from pneumo_ros.thesis.half import conventional_car
+from pneumo_ros.thesis.models.conventional import Conventional, simulate_conventional
+from pneumo_ros.thesis.models.similar_systems import half_rates, rig_car, simulate
+from pneumo_ros.thesis.models.similitude import (
     HONDA_CIVIC,
     Scales,
     evaluate,
@@ -20,10 +24,6 @@ from pneumo_ros.plant.similitude import (
     scaled_down,
     scaled_up,
 )
-from pneumo_ros.plant.trim import nominal_half_car
-from pneumo_ros.rig import load_rig
-from pneumo_ros.thesis.chapter3 import PRINTED, in_words, read_car
-from pneumo_ros.thesis.half import conventional_car
 from pneumo_ros.thesis.similitude_proof import SYSTEMS, difference, laws_of
 
 SAME = 1e-6  # standard deviations of each state

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.thesis import app
 from pneumo_ros.errors import InputError
-from pneumo_ros.plant.moving_base import bench_at, natural_frequency, response
 from pneumo_ros.thesis import beyond, chapter5, chapter6, chapter6_half, chapter6_quarter, quarter_pictures, robustness
 from pneumo_ros.thesis.book import CHAPTERS, book
 from pneumo_ros.thesis.equations import equation_index, mentioned
 from pneumo_ros.thesis.half import HalfExperiment, measure, run
 from pneumo_ros.thesis.linearised import area_stiffness_share, body_mode
+from pneumo_ros.thesis.models.moving_base import bench_at, natural_frequency, response
 from pneumo_ros.thesis.quarter import measure as measure_quarter
 from pneumo_ros.thesis.report import printed_claims
 from pneumo_ros.thesis.settings import ThesisSettings, load_settings

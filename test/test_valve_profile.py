@@ -19,8 +19,8 @@ from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import build_road
+from pneumo_ros.road.valve_profile import ValveProfile, read_profile
 from pneumo_ros.session.replay import replay
-from pneumo_ros.valve_profile import ValveProfile, read_profile
 
 RIG = load_rig()
 REST, LARGEST = trim(RIG).command, RIG.inlet_area_max.value

@@ -223,7 +223,7 @@ def _check_profile(values: Values, rig: Rig) -> None:
     from pneumo_ros.control.half_car import PROFILE
     from pneumo_ros.daq.safety_config import load_safety
     from pneumo_ros.plant.trim import trim
-    from pneumo_ros.valve_profile import read_profile
+    from pneumo_ros.road.valve_profile import read_profile
 
     if values["controller"].get("controller") != PROFILE:
         return

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.comfort import Ride, judge
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.reading import Joint, Log, read_log
+from pneumo_ros.ride.comfort import Ride, judge
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import GRAVITY
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.comfort_limits import HEALEY, ISO_1972_HOURS, iso_1972_limit, third_octaves
 from pneumo_ros.road import LENGTH_SCALE
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
+from pneumo_ros.thesis.comfort_limits import HEALEY, ISO_1972_HOURS, iso_1972_limit, third_octaves
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import CONVENTIONAL, HalfExperiment, heave_of, measure
 from pneumo_ros.thesis.report import Chapter, Picture, Step, Table, canvas, verdict

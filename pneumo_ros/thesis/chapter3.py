@@ -7,8 +7,15 @@ from fractions import Fraction
 
 from pneumo_ros.paths import share_file
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
-from pneumo_ros.plant.similitude import BASE, DIMENSIONS, HONDA_CIVIC, Powers, pi_number, representative_pi_numbers
 from pneumo_ros.thesis.chapter5 import read_table
+from pneumo_ros.thesis.models.similitude import (
+    BASE,
+    DIMENSIONS,
+    HONDA_CIVIC,
+    Powers,
+    pi_number,
+    representative_pi_numbers,
+)
 from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.thesis.similitude_proof import difference, laws_of

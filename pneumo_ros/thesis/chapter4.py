@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from pneumo_ros.plant.air_spring import effective_area, load_surface, spring_volume
-from pneumo_ros.plant.similitude import HONDA_CIVIC, Scales
 from pneumo_ros.thesis.chapter5 import read_table
+from pneumo_ros.thesis.models.similitude import HONDA_CIVIC, Scales
 from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.thesis.similitude_proof import SYSTEMS, difference, laws_of

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from pneumo_ros.paths import share_file
 from pneumo_ros.plant.air_spring import AreaSurface, build_linear_surface
-from pneumo_ros.plant.moving_base import Bench, bench_at, natural_frequency, response
+from pneumo_ros.thesis.models.moving_base import Bench, bench_at, natural_frequency, response
 from pneumo_ros.thesis.report import Chapter, Claim, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import INCH, POUND_MASS, PSI, SQUARE_INCH

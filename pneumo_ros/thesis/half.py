@@ -8,19 +8,19 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.comfort import Ride, judge, rms
-from pneumo_ros.comfort_limits import healey, janeway_use, permitted_hours, third_octaves, weighted_rms
 from pneumo_ros.control.half_car import build_controller
 from pneumo_ros.control.loop import Run, close_loop
 from pneumo_ros.control.presets import PRESETS
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.parameters import Value
 from pneumo_ros.plant.air_spring import effective_area
-from pneumo_ros.plant.conventional import Conventional, conventional_rates, simulate_conventional
 from pneumo_ros.plant.half_car import HalfCar, half_car
 from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.ride.comfort import Ride, judge, rms
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.road import LENGTH_SCALE, make_road
+from pneumo_ros.thesis.comfort_limits import healey, janeway_use, permitted_hours, third_octaves, weighted_rms
+from pneumo_ros.thesis.models.conventional import Conventional, conventional_rates, simulate_conventional
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import GRAVITY, INCH, SQUARE_INCH
 

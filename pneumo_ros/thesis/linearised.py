@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.control.linearisation import area_slopes
-from pneumo_ros.control.quarter_car import QuarterLaw, control_quarter, quarter_law
 from pneumo_ros.plant.air_spring import effective_area
-from pneumo_ros.plant.quarter_car import QuarterCar, QuarterTrim
+from pneumo_ros.thesis.models.quarter_car import QuarterCar, QuarterTrim
+from pneumo_ros.thesis.models.quarter_car_control import QuarterLaw, control_quarter, quarter_law
 from pneumo_ros.thesis.quarter import Experiment, plant
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import INCH, POUND_FORCE

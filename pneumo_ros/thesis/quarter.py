@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from pneumo_ros.comfort import mean_personal_rating, rms
-from pneumo_ros.control.quarter_car import QuarterRun, coast_quarter, drive_quarter, quarter_law
 from pneumo_ros.plant.air_spring import effective_area
-from pneumo_ros.plant.quarter_car import QuarterCar, QuarterTrim, constant_area_surface, quarter_car
+from pneumo_ros.ride.comfort import mean_personal_rating, rms
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import LENGTH_SCALE, make_road
+from pneumo_ros.thesis.models.quarter_car import QuarterCar, QuarterTrim, constant_area_surface, quarter_car
+from pneumo_ros.thesis.models.quarter_car_control import QuarterRun, coast_quarter, drive_quarter, quarter_law
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import GRAVITY, INCH, SQUARE_INCH
 
@@ -29,7 +29,7 @@ class Experiment:
     ----------
     law : name of a control law, or "passive"
     cylinder : a pneumatic cylinder of 5 in2 instead of the air spring
-    options : keyword arguments of :func:`pneumo_ros.control.quarter_car.quarter_law`
+    options : keyword arguments of :func:`pneumo_ros.thesis.models.quarter_car_control.quarter_law`
     """
 
     law: str

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pneumo_ros.plant import dimensionless, similar_systems
-from pneumo_ros.plant.conventional import Conventional, simulate_conventional
-from pneumo_ros.plant.similar_systems import Car, Rates, Vector, full_scale, rig_car, simulate
-from pneumo_ros.plant.similitude import Scales
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 from pneumo_ros.thesis.half import conventional_car
+from pneumo_ros.thesis.models import dimensionless, similar_systems
+from pneumo_ros.thesis.models.conventional import Conventional, simulate_conventional
+from pneumo_ros.thesis.models.similar_systems import Car, Rates, Vector, full_scale, rig_car, simulate
+from pneumo_ros.thesis.models.similitude import Scales
 from pneumo_ros.units import INCH, SQUARE_INCH
 
 HEIGHT, AREA, ORIFICE = 1.8 * INCH, 1.6 * SQUARE_INCH, 0.025 * SQUARE_INCH  # h, A_eff and A of Section 4.3

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area, load_surface
-from pneumo_ros.plant.conventional import Conventional
-from pneumo_ros.plant.similar_systems import Car, Rates, Spring, Vector, flow_number
+from pneumo_ros.thesis.models.conventional import Conventional
+from pneumo_ros.thesis.models.similar_systems import Car, Rates, Spring, Vector, flow_number
 
 
 class ConventionalPi(NamedTuple):

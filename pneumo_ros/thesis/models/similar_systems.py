@@ -1,7 +1,7 @@
 """Four systems written with every constant as a parameter, so that similitude can be tried on them.
 
 Air spring under a mass (Eqs. 4.22-4.23), quarter car (4.53-4.55) and half car (4.63-4.72) on air springs; their
-dimensionless forms are in :mod:`pneumo_ros.plant.dimensionless`. The compiled plant
+dimensionless forms are in :mod:`pneumo_ros.thesis.models.dimensionless`. The compiled plant
 has gravity and the atmosphere built in; similitude needs them free, because both must scale: g with C_L/C_T^2, the
 atmosphere with C_P. Nature lets neither (errata 18).
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, effective_area, load_surface
 from pneumo_ros.plant.orifice import critical_ratio, flow_function
-from pneumo_ros.plant.similitude import Scales
+from pneumo_ros.thesis.models.similitude import Scales
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, GRAVITY
 
 Vector = NDArray[np.float64]

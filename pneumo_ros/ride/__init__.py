@@ -1,0 +1,1 @@
+"""How a ride is judged: comfort by ISO 2631 and what the rig's own limits say."""

@@ -1,0 +1,1 @@
+"""Models that only the thesis's chapters need: quarter cars, similar systems, a moving base, a conventional car."""
