@@ -13,8 +13,8 @@ from itertools import combinations
 import numpy as np
 from kernel import PERIOD, STEPS, c_runner
 
-from pneumo_ros.gap.compose import CORRECTIONS
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 

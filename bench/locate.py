@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import read_signals
 from pneumo_ros.gap.where import locate
 

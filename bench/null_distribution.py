@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.compete import Contest, Effort, compete
-from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.problem import Problem
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.selection import Scored, advantage, score
 from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.plant.trim import trim

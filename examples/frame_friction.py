@@ -21,17 +21,16 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.signal import savgol_filter
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import Active, EffectParameter, Parameter, PlainEffect
+from pneumo_ros.gap.model import PlainEffect
 from pneumo_ros.gap.verdict import Calibration
-
-Array = NDArray[np.float64]
 
 FLOOR_NOISE = 2e-6  # m, laser: what fourth differences of the log show, times four for what is not white
 SUBSTEPS = 4  # RK4 at 1 ms: friction that turns over within 0.5 mm/s needs steps below 3 ms

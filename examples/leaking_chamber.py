@@ -20,18 +20,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import Active, EffectParameter, Parameter, PlainEffect
+from pneumo_ros.gap.model import PlainEffect
 from pneumo_ros.gap.problem import AVERAGED, REACH
 from pneumo_ros.gap.selection import Thresholds
 from pneumo_ros.gap.verdict import Calibration
 from pneumo_ros.units import ATMOSPHERE
-
-Array = NDArray[np.float64]
 
 BAR = 1e5  # Pa
 TIGHT = 0.005  # share of the absolute pressure that a tight chamber may lose ...

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumo_ros.gap.model import Array
+from pneumo_ros.arrays import Array
 
 PERIOD, NOISE = 2e-3, 1e-3
 

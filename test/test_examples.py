@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
 import frame_friction
 import leaking_chamber
 
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import Active
 
 
 @pytest.fixture(scope="module")

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from rig_logs import excitation, signals_of, simulated
 
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.compete import Effort, starts_elsewhere
 from pneumo_ros.gap.diagnose import Options, diagnose
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, bounded_newton, fit, sensitivities
 from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
-from pneumo_ros.gap.model import Active
 from pneumo_ros.gap.problem import Candidate, Problem
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.screen import all_parts, promises, trials, visibility
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.uncertainty import at_bounds, covariance, nuisance_estimates

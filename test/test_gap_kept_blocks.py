@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from driven_log import NOISE, PERIOD, DrivenLog
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.gap.compete import Effort, compete
-from pneumo_ros.gap.model import Active, Array, EffectLike, EffectParameter, Parameter, PlainEffect
+from pneumo_ros.gap.model import EffectLike, PlainEffect
 from pneumo_ros.gap.problem import BLOCK, SELECT_EVERY, Problem
 from pneumo_ros.gap.selection import Thresholds, score, select
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from driven_log import NOISE, PERIOD, DrivenLog
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active, Parameter
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.compete import Effort, compete
 from pneumo_ros.gap.fit import fit
-from pneumo_ros.gap.model import Active, Array, EffectLike, Parameter
+from pneumo_ros.gap.model import EffectLike
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.shooting import astray, fit_from_windows
 

@@ -12,9 +12,9 @@ import pytest
 from rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
-from pneumo_ros.gap.compose import CORRECTIONS
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, prepare, read_signals
 from pneumo_ros.gap.where import (
     Start,

@@ -50,7 +50,7 @@ def emulate(
     from pneumo_ros.daq.emulator.faults import parse_fault
     from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
     from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
-    from pneumo_ros.gap.stepped import stepped_rig
+    from pneumo_ros.effects.stepping import stepped_rig
     from pneumo_ros.rig import load_rig
 
     console = Console(quiet=quiet, highlight=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pneumo_ros.gap.stepped import stepped_rig
+from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.session.passive import passive_twin, road_period
 from pneumo_ros.session.summary import Recorded
 

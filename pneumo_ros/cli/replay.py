@@ -215,7 +215,7 @@ def _closed_loop(
 
 def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | None) -> Rerun:
     """From rest, on the log's rig or the given one, with its effects if it has any."""
-    from pneumo_ros.gap.stepped import stepped_rig
+    from pneumo_ros.effects.stepping import stepped_rig
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.rerun import rerun
 

@@ -205,7 +205,7 @@ def _check(values: Values, target: Path) -> Rig:
     rig = load_rig(str(values["road_profile"].get("rig", "")) or None)
     trim(rig)
     if rig.effects:
-        from pneumo_ros.gap.standing import library_of, standing_effects
+        from pneumo_ros.effects.configured import library_of, standing_effects
 
         standing_effects(rig, library_of(rig))
     _check_profile(values, rig)

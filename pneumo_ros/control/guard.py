@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pneumo_ros.arrays import Array
 from pneumo_ros.control.profile import Commander
-
-Array = NDArray[np.float64]
 
 
 class Guarded(NamedTuple):

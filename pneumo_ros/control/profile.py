@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.control.half_car import PARAMETERS, PROFILE, build_controller
 from pneumo_ros.parameters import Value, settings
 from pneumo_ros.plant.trim import Trim, trim
 from pneumo_ros.rig import Rig
 from pneumo_ros.road.valve_profile import ValveProfile, read_profile
 
-Array = NDArray[np.float64]
 NUMBER = 6  # place in the state of the number of the next sample; a controller keeps an integral there
 
 

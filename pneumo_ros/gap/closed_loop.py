@@ -1,6 +1,7 @@
 """A log's road through the rig *as diagnosed*, in closed loop: what other gains would do on the rig with its effects.
 
-The twin (:mod:`pneumo_ros.gap.twin_rig`) is stepped period by period, estimator and controller as a session runs them.
+The rig (:mod:`pneumo_ros.effects.corrected_rig`) is stepped period by period, estimator and controller as a session
+runs them.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.effects.configured import library_of
+from pneumo_ros.effects.corrected_rig import TwinRig
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
-from pneumo_ros.gap.standing import library_of
-from pneumo_ros.gap.twin_rig import TwinRig
 from pneumo_ros.parameters import Value
 from pneumo_ros.session.rerun import Rerun, close_stepped
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage

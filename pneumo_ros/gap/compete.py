@@ -13,10 +13,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.events import timed
 from pneumo_ros.gap.fit import Fit, fit
-from pneumo_ros.gap.model import Array, EffectParameter
 from pneumo_ros.gap.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.gap.screen import Promise, all_parts, compatible, promises, trials, visibility
 from pneumo_ros.gap.selection import FORM, Thresholds, noise_level, score

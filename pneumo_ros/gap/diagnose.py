@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.ambiguity import ambiguity_group
 from pneumo_ros.gap.compete import Contest, Effort, Progress, compete
 from pneumo_ros.gap.diagnosis import Diagnosis, Experiment, Gap
 from pneumo_ros.gap.fit import Fit, fit, sensitivities
 from pneumo_ros.gap.held_out import noise_floor, settle, total_gap
-from pneumo_ros.gap.model import Active, Array, Mask, Model
+from pneumo_ros.gap.model import Model
 from pneumo_ros.gap.outcome import Outcome, Whereabouts
 from pneumo_ros.gap.places import effect_shares
 from pneumo_ros.gap.problem import Problem
@@ -65,7 +67,7 @@ def diagnose(
 
     Parameters
     ----------
-    model : :class:`pneumo_ros.gap.rig_model.RigModel` for the half car
+    model : :class:`pneumo_ros.effects.rig_model.RigModel` for the half car
     fit_logs : records to fit, see :class:`pneumo_ros.gap.model.Record`
     holdout : record that nothing is fitted to
     progress : called with the share done and what is being done

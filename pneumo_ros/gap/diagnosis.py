@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.gap.model import Active, Array
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
 
 ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
 

@@ -14,8 +14,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.fit import CORRELATION, Fit, bounded_newton, fit
-from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 
 PRIOR_STD = 0.5  # samples: a lead costs something, so that jumps nothing depends on stay where the log has them

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.diagnosis import Experiment
 from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem, average
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.plant.trim import Trim, trim
 
 DURATION = 12.0  # s

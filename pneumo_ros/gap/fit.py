@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pneumo_ros.gap.model import Array, Mask
+from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.gap.problem import Candidate, Problem
 
 CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.fit import bounded_newton
-from pneumo_ros.gap.model import Active, Array, Model
+from pneumo_ros.gap.model import Model
 from pneumo_ros.gap.problem import INITIAL_WIDENING, scale_of
 
 BOOTSTRAP_BLOCK = 1.0  # s: longer than the slowest oscillation of a residual

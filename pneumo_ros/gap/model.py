@@ -1,71 +1,17 @@
 """What the diagnosis needs to know of any model: parameters, initial state, effects, and a prediction.
 
 Fitting, selection, ambiguity and verdict use nothing but these protocols, so that another rig (a frame on a shaker, an
-air chamber) is diagnosed by the same code; :mod:`pneumo_ros.gap.rig_model` is the half car's.
+air chamber) is diagnosed by the same code; :mod:`pneumo_ros.effects.rig_model` is the half car's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A nuisance parameter: what the maker states and how well it is known.
-
-    ``std`` is one sigma of the prior in ``unit``; the fit stays inside ``nominal`` +-
-    :data:`~pneumo_ros.gap.fit.REACH` sigma.
-    """
-
-    name: str
-    unit: str
-    nominal: float
-    std: float
-
-
-@dataclass(frozen=True)
-class EffectParameter:
-    """A parameter of an effect.
-
-    Attributes
-    ----------
-    name, unit : SI
-    low, high : bounds of the fit
-    typical : a size (or shape) worth trying first; also the scale of the fit
-    size : True for the parameter whose zero means "no effect"; False for one that shapes it
-    starts : further values to start the fit from
-    ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
-        well stop; a stop at another bound is counted against the effect
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    typical: float
-    size: bool = False
-    starts: tuple[float, ...] = ()
-    ends: tuple[float, ...] = (0.0,)
-
-
-@dataclass(frozen=True)
-class Derived:
-    """A number that an effect's parameters give together, for the report: often better known than any of them.
-
-    ``of`` maps the parameter values (SI, in order) to it.
-    """
-
-    name: str
-    unit: str
-    of: Callable[[tuple[float, ...]], float]
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 
 
 class EffectLike(Protocol):
@@ -89,15 +35,6 @@ class PlainEffect:
     id: str
     sites: tuple[str, ...]
     parameters: tuple[EffectParameter, ...]
-
-
-@dataclass(frozen=True)
-class Active:
-    """An effect at a site with values of its parameters (in their order)."""
-
-    effect: str
-    site: str
-    values: tuple[float, ...]
 
 
 class Record(Protocol):

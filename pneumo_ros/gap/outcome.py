@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.compete import Contest
 from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.problem import Problem
 from pneumo_ros.gap.runs import HeldOut
 from pneumo_ros.gap.selection import Scored

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.gap.model import Active, Array, Model
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.gap.model import Model
 from pneumo_ros.gap.problem import scale_of
 
 

@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.model import Active, Array, EffectParameter, Mask, Model
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.effects.parameters import Active, EffectParameter
+from pneumo_ros.gap.model import Model
 
 AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
 MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.compete import with_jacobian
 from pneumo_ros.gap.diagnosis import Ranked
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.held_out import bootstrap_shrink
-from pneumo_ros.gap.model import Active, Model
+from pneumo_ros.gap.model import Model
 from pneumo_ros.gap.outcome import Outcome
 from pneumo_ros.gap.problem import Candidate, Problem
 from pneumo_ros.gap.runs import HeldOut, held_by

@@ -8,17 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects import library as own_effects
+from pneumo_ros.effects.configured import library_of
+from pneumo_ros.effects.contract import Effect
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap import effects as effect_files
 from pneumo_ros.gap.compete import Progress
 from pneumo_ros.gap.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.effects.base import Effect
-from pneumo_ros.gap.model import Active, Array
 from pneumo_ros.gap.outcome import Whereabouts
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals, check_pair, read_signals
-from pneumo_ros.gap.standing import library_of
 from pneumo_ros.gap.where import Location, flexible_gain, locate
 from pneumo_ros.rig import Rig
 
@@ -92,7 +93,7 @@ def prepared(
 
 def _outside(library: Mapping[str, Effect]) -> list[str]:
     """Which effects of the library are not the package's own: a reader must know who competed."""
-    folder = Path(effect_files.__file__).parent
+    folder = Path(str(own_effects.__file__)).parent
     names = [name for name in library if not (folder / f"{name}.py").exists()]
     return [f"effects of your own that competed: {', '.join(names)}"] if names else []
 

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.gap.diagnosis import EditTest
 from pneumo_ros.gap.fit import Fit
 from pneumo_ros.gap.held_out import channel_gaps, free_run, total_gap
-from pneumo_ros.gap.model import Active, Array, Model
+from pneumo_ros.gap.model import Model
 from pneumo_ros.gap.problem import Problem
 
 

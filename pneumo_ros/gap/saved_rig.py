@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pneumo_ros.effects.contract import Effect
+from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import NUISANCE, RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.effects.base import Effect
-from pneumo_ros.gap.effects.loading import load_library
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import NUISANCE, RigModel
 from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
 
 _OUTLETS = ("outlet_area_front", "outlet_area_rear")

@@ -15,8 +15,9 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.gap.fit import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
-from pneumo_ros.gap.model import Array, EffectParameter, Mask
 from pneumo_ros.gap.problem import Candidate, Part, Problem
 
 SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already

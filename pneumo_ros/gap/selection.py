@@ -14,8 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.fit import CORRELATION, Fit
-from pneumo_ros.gap.model import Array
 from pneumo_ros.gap.problem import Problem
 from pneumo_ros.paths import share_file
 

@@ -11,8 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.fit import Fit, fit
-from pneumo_ros.gap.model import Array, Record
+from pneumo_ros.gap.model import Record
 from pneumo_ros.gap.problem import BLOCK, SELECT_EVERY, Candidate, Problem
 
 WINDOWS = 2  # in a time block

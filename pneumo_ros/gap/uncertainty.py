@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.gap.diagnosis import Estimate
 from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.model import Array, EffectParameter, Mask
 from pneumo_ros.gap.problem import Problem
 
 LONGEST = 60  # fit samples over which the residual's correlation is summed

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
-from pneumo_ros.gap.stepped import stepped_rig
+from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
 from pneumo_ros.nodes.base import OK, RigNode

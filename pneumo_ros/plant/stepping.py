@@ -1,7 +1,7 @@
 """A rig that can be stepped: what the plant node, the emulator and the replayed loop need to know of one.
 
 Parameters are inside the object, the state is outside: ``init -> state``, ``step(state, command, road) -> state``. The
-nominal equations are :class:`PlainRig`; a rig with diagnosed effects is :class:`pneumo_ros.gap.twin_rig.TwinRig`.
+nominal equations are :class:`PlainRig`; a rig with diagnosed effects is a corrected rig, of another room.
 """
 
 from __future__ import annotations
@@ -9,15 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pneumo_ros.arrays import Array
 from pneumo_ros.plant.half_car import HalfCar, half_car
 from pneumo_ros.plant.sensors import read_channels, truth
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 class SteppedRig(Protocol):

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.profile import ProfilePlayer, build_commander
@@ -19,8 +19,6 @@ from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig
-
-Array = NDArray[np.float64]
 
 
 class Output(NamedTuple):

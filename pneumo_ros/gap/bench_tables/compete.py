@@ -14,14 +14,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.bench_tables.data import Bench, load_bench
 from pneumo_ros.gap.bench_tables.laws import LAWS, NUISANCE, Law
 from pneumo_ros.gap.problem import REACH
-
-Array = NDArray[np.float64]
 
 MARGIN = 0.9  # a law with more parameters must leave less than this share of the gap that one with fewer leaves
 TRUST = {

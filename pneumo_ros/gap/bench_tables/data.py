@@ -7,13 +7,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.paths import share_file
 from pneumo_ros.plant.air_spring import AreaSurface, build_linear_surface
 from pneumo_ros.units import INCH, POUND_MASS, PSI, SQUARE_INCH
-
-Array = NDArray[np.float64]
 
 FREQUENCY, DAMPING, AREA = (
     "table_5_4_natural_frequency_hz.csv",

@@ -11,15 +11,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import EffectParameter, Parameter
 from pneumo_ros.gap.bench_tables.data import Bench
-from pneumo_ros.gap.model import EffectParameter, Parameter
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area, spring_volume
 from pneumo_ros.units import ATMOSPHERE, GRAVITY, INCH
 
-Array = NDArray[np.float64]
 Values = Mapping[str, float]
 
 SLOPE_STEP = 2.5e-4  # m, 0.01 in: less than the experiment moves; averages both slopes at a corner of the look-up

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.gap.report.rig_map import draw_map
 from pneumo_ros.gap.report.words import (
@@ -24,8 +24,6 @@ from pneumo_ros.gap.report.words import (
 )
 from pneumo_ros.gap.signals import MEASURED, Signals
 from pneumo_ros.gap.where import Law
-
-Array = NDArray[np.float64]
 
 ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
 SHOWN_CHANNELS = 2  # the rest is folded away

@@ -7,21 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.diagnosis import Diagnosis, write_json
 from pneumo_ros.gap.held_out import channel_gaps, total_gap
 from pneumo_ros.gap.report.contents import Findings
 from pneumo_ros.gap.report.page import write_report
 from pneumo_ros.gap.report.residual_log import write_residual_log
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where import Location, conditional_gaps, habitat, locate, missing_law, predict_located
 from pneumo_ros.gap.where.design import car_of
 from pneumo_ros.gap.where.regimes import harmonics
-
-Array = NDArray[np.float64]
 
 MAX_LAWS = 2
 FILES = ("diagnosis.json", "report.html", "residual.mcap")

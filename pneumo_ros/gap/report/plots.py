@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from pneumo_ros.arrays import Array
 
 LEFT, RIGHT, TOP, BOTTOM = 62, 10, 8, 22
 MAX_POINTS = 700  # vertices a line is reduced to; extremes of each piece are kept

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals
 from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
 from pneumo_ros.log.topics import (
@@ -27,8 +28,6 @@ from pneumo_ros.log.topics import (
     STRING,
 )
 from pneumo_ros.log.writing import Channel, LogWriter
-
-Array = NDArray[np.float64]
 
 PREFIXES = {"nominal": "/nominal", "refit": "/refit", "best": "/corrected"}
 CONFIG = "/rig/config"

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.types import TopicData
 from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import GRAVITY
-
-Array = NDArray[np.float64]
 
 ROAD_LIMIT = 0.5  # m; the exciter moves by centimetres
 CLOCK_STEP = 0.05  # s by which a topic's delay may move against the others: a stalled recorder delays all alike

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.noise import quantum, white_noise
 from pneumo_ros.gap.signals.types import MEASURED, NO_VERDICT, Limitation
-
-Array = NDArray[np.float64]
 
 MIN_RUN = 10  # equal samples in a row that are suspicious at all
 QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion stays within a step

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.doubts import check_clocks, check_gauge, check_road_unit
 from pneumo_ros.gap.signals.health import all_limits, check_channel, missing
@@ -15,8 +15,6 @@ from pneumo_ros.gap.signals.timebase import drivable_span, held, in_order, sampl
 from pneumo_ros.gap.signals.types import COMMANDS, MEASURED, ROADS, Limitation, Signals, TopicData
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
-
-Array = NDArray[np.float64]
 
 ROAD, VALVE, DISPLACEMENT = "/road/profile", "/valve/command", "/rig/displacement"
 PRESSURE = {"front_pressure": "/rig/front/pressure", "rear_pressure": "/rig/rear/pressure"}

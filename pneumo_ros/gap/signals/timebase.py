@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.errors import InputError
 from pneumo_ros.gap.signals.types import TopicData, TopicTiming
-
-Array = NDArray[np.float64]
 
 BACK_JUMP = 0.1  # s: stamps further back than this are a clock set back, not samples out of order
 INPUT_GAP = 0.25  # s: longer without command or road, the model cannot be driven across

@@ -10,17 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pneumo_ros.gap.compose import CORRECTIONS
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.held_out import settle
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.where.design import Design, car_of, inputs_of, pressure_rates
 from pneumo_ros.gap.where.features import Features
 from pneumo_ros.gap.where.weak import Windows, averaged, weak_residuals
-
-Array = NDArray[np.float64]
 
 PASSES = 4  # the first is the free run; the third is within a few null standard deviations of the log
 CARRIERS = ("body_heave", "body_pitch", "front_tyre", "rear_tyre", "front_air", "rear_air")  # one an equation

@@ -14,12 +14,11 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.signals import MEASURED, Signals
 from pneumo_ros.gap.where.features import SMOOTHING
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
 from pneumo_ros.plant.half_car import Body, HalfCar, State, derivative
-
-Array = NDArray[np.float64]
 
 
 class Subsystem(NamedTuple):

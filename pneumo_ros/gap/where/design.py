@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED, Signals
 from pneumo_ros.gap.where.features import Features, Yardstick, features_of
 from pneumo_ros.gap.where.flexible import Basis, all_bases
 from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, Windows, averaged, make_windows, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GRAVITY
-
-Array = NDArray[np.float64]
 
 # Model form: what a rig whose only fault is its tolerances leaves of an equation, relative to the equation's own size.
 # On such rigs (other friction, gas and valve laws, none of them faulty) 0.05 % brings every equation to about one.

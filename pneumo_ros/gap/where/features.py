@@ -9,16 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import lfilter, savgol_filter, ss2tf
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.plant.air_spring import Gas, inlet_flow, outlet_flow, pressure_power
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GAS_CONSTANT
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 0.03  # s, cubic: keeps wheel hop to 1 %, rates to 1 mm/s
 ACCELERATION_SMOOTHING = 0.042  # s, quartic

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where.locate import Location, Start, corrected_residual, locate
-
-Array = NDArray[np.float64]
 
 EXPLAINED = 1.0  # mean square, null standard deviations, that noise, tolerances and model form leave anyway
 SPAN = 1.0  # s of a block whose mean squares are taken as independent

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.where.locate import Location, corrected_residual
 from pneumo_ros.gap.where.regimes import BANDS, Regime, bands, regimes, sharpest, shows_in
 from pneumo_ros.gap.where.weak import EQUATIONS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.gap.signals import MEASURED
 from pneumo_ros.gap.where.design import Design
 from pneumo_ros.gap.where.locate import Location, corrected_residual
 from pneumo_ros.gap.where.regimes import shows_in
 from pneumo_ros.gap.where.weak import EQUATIONS, UNITS, averaged
-
-Array = NDArray[np.float64]
 
 BINS = 15
 RISE = 0.02  # s over which a change of opening is taken

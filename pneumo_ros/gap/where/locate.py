@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where.along import explained
 from pneumo_ros.gap.where.design import Design, design_of, with_sensor_columns
@@ -22,8 +23,6 @@ from pneumo_ros.gap.where.sets import FLAT, LARGEST, Closing, best_subset, rival
 from pneumo_ros.gap.where.solve import Forms, Rows, forms_of
 from pneumo_ros.gap.where.time_course import courses_of
 from pneumo_ros.gap.where.weak import EQUATIONS
-
-Array = NDArray[np.float64]
 
 # Shapes that close less than this of the held-out squared residual do not know the law: its course in time decides.
 TRUSTED = 0.5

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.gap.where.design import Design
 from pneumo_ros.gap.where.features import End
 from pneumo_ros.gap.where.weak import EQUATIONS, UNITS
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BANDS = (0.0, 1.0, 4.0, 7.0, 12.0, 25.0, 60.0)  # Hz: drift, body, between, wheel hop, above
 LIGHT = 0.3  # of the mean tyre load: below it contact is light

@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pneumo_ros.gap.compose import CORRECTIONS
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.held_out import channel_gaps, total_gap
-from pneumo_ros.gap.model import Active
-from pneumo_ros.gap.rig_model import RigModel
 from pneumo_ros.gap.signals import Signals
 from pneumo_ros.gap.where.design import PARAMETER_STEP, Design, pressure_rates
 from pneumo_ros.gap.where.features import Features
 from pneumo_ros.gap.where.flexible import Basis
 from pneumo_ros.gap.where.locate import Location, Start, locate, spread
 from pneumo_ros.gap.where.solve import REACH, box_minimum
-
-Array = NDArray[np.float64]
 
 TARGET = 0.01  # normalised misfit of a free run that is as good as it gets with laws that are not the rig's own
 
@@ -31,9 +29,10 @@ _COLUMN = {"force": "{end}_force", "air": "{end}_air", "axle": "{end}_tyre", "he
 
 
 def correction_series(bases: Sequence[Basis], coefficients: Array, features: Features) -> tuple[Array, Array, Array]:
-    """Corrections as time series: (N, 9) of :data:`~pneumo_ros.gap.compose.CORRECTIONS`, road (N, 2), sensors (N, 6).
+    """Corrections as time series: (N, 9), road (N, 2), sensors (N, 6).
 
-    The last is what the measured channels would have to be corrected by; a prediction is corrected the other way.
+    The first are those of :data:`~pneumo_ros.effects.composition.CORRECTIONS`; the last is what the measured channels
+    would have to be corrected by, and a prediction is corrected the other way.
     """
     count = len(features.heave)
     held, road, sensors = np.zeros((count, len(CORRECTIONS))), np.zeros((count, 2)), np.zeros((count, 6))

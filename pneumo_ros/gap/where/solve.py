@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-Array = NDArray[np.float64]
+from pneumo_ros.arrays import Array
 
 REACH = 3.0  # standard deviations that a parameter may be off
 # Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough for

@@ -13,18 +13,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 
-from pneumo_ros.gap.rig_model import RigModel
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.gap.signals import MEASURED
 from pneumo_ros.gap.where.design import Design, car_of, inlet_gain, inputs_of
 from pneumo_ros.gap.where.solve import REACH, box_minimum
 from pneumo_ros.gap.where.weak import EQUATIONS, averaged, weak_residuals
 from pneumo_ros.plant.half_car import HalfCar
-
-Array = NDArray[np.float64]
 
 REACHED = 3  # windows on each side that a bump of a sensor's course moves: two of the bump, one of the window
 STEP = 0.05  # of a channel's standard deviation, to carry a course through the equations

@@ -21,11 +21,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, inlet_flow, outlet_flow, pressure_power
 from pneumo_ros.plant.half_car import Body, HalfCar
 from pneumo_ros.units import GAS_CONSTANT, GRAVITY
-
-Array = NDArray[np.float64]
 
 EQUATIONS = ("heave", "pitch", "front_axle", "rear_axle", "front_air", "rear_air")
 UNITS = ("N", "N m", "N", "N", "kg/s", "kg/s")

@@ -1,0 +1,1 @@
+"""Unmodelled effects as laws: their contract, the library, the compiled kernel that holds them, rigs that have them."""

@@ -1,0 +1,128 @@
+"""What an effect is: identity, sites, parameters, and one or more hooks by which it acts.
+
+A file of this folder defines one module-level ``EFFECT``; a user's own file does the same and is loaded by path or by
+the entry point group ``pneumo_ros.effects``. Four kinds of hook:
+
+- ``plant``: changes parameters of the nominal model (costs nothing),
+- ``inputs``: changes command or road on their way to the plant (outside the kernel),
+- ``term``: adds force or flow inside the compiled kernel, with own states where needed,
+- ``outputs``: changes what a sensor reports.
+
+``inputs`` and ``outputs`` work on a block of rows and carry a memory from block to block (None before the first row),
+so that a whole log and a rig that is stepped row by row go through the same lines; :func:`by_column` does the carrying.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.parameters import Derived, EffectParameter
+from pneumo_ros.plant.air_spring import Gas
+from pneumo_ros.plant.half_car import Body
+
+Values = tuple[float, ...]
+Memory = Any  # what an effect keeps from one block of rows to the next; None before the first
+
+ENDS = ("front", "rear", "both")
+RIG = ("",)
+LVDTS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear")
+PRESSURES = ("front_pressure", "rear_pressure")
+PRESSURES_OR_BOTH = (*PRESSURES, "both")
+CHANNELS = LVDTS + PRESSURES
+SENSOR_PLACES = {
+    "front_pressure": "sensor:front_pressure",
+    "rear_pressure": "sensor:rear_pressure",
+    **{name: f"sensor:{name}" for name in LVDTS},
+}
+
+
+class Plant(NamedTuple):
+    """The half car's parameters: body, front gas, rear gas."""
+
+    body: Body
+    front: Gas
+    rear: Gas
+
+
+class Inputs(NamedTuple):
+    """What drives the plant: commands (N, 4) m2, each row held over a period; road (M, 2) m, linear between rows.
+
+    A whole record has one row of road more than of commands; further blocks have as many of one as of the other.
+    """
+
+    commands: Array
+    road: Array
+
+
+class Ends(NamedTuple):
+    """Which ends a site covers."""
+
+    front: bool
+    rear: bool
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """0 and/or 1."""
+        return tuple(i for i, on in enumerate(self) if on)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An unmodelled effect of the half car.
+
+    Attributes
+    ----------
+    id : as in the log and diagnosis contract
+    summary : one sentence
+    sites : where it may act ("front", "rear", "both"; "" for the rig; or channel names)
+    places : place per end with ``{end}`` standing for front or rear, first the one it is blamed on; unused for sensors
+    parameters : those with ``size=True`` are zero when there is no effect
+    derived : what they give together
+    plant, inputs, outputs, term : hooks, see the module
+    """
+
+    id: str
+    summary: str
+    sites: tuple[str, ...]
+    places: tuple[str, ...]
+    parameters: tuple[EffectParameter, ...]
+    derived: tuple[Derived, ...] = ()
+    plant: Callable[[Plant, Ends, Values], Plant] | None = None
+    inputs: Callable[[Inputs, float, Ends, Values, Memory], tuple[Inputs, Memory]] | None = None
+    outputs: Callable[[Array, float, tuple[int, ...], Values, Memory], tuple[Array, Memory]] | None = None
+    undo: Callable[[Array, tuple[int, ...], Values], Array] | None = None
+    term: PlantTerm | None = None
+
+
+def by_column(
+    change: Callable[[Array, Memory], tuple[Array, Memory]], table: Array, columns: Sequence[int], memory: Memory
+) -> tuple[Array, Memory]:
+    """Some columns of a block changed, each with its own memory; an empty block leaves everything as it is."""
+    if not len(table):
+        return table, memory
+    out, kept = table.copy(), dict(memory or {})
+    for column in columns:
+        out[:, column], kept[column] = change(table[:, column], kept.get(column))
+    return out, kept
+
+
+def ends_of(site: str) -> Ends:
+    """Ends that a site covers; the whole rig is both."""
+    return Ends(site in ("front", "both", ""), site in ("rear", "both", ""))
+
+
+def channels_of(site: str) -> tuple[int, ...]:
+    """Columns of the measured channels that a sensor effect's site covers; "both" are the two pressures."""
+    return tuple(CHANNELS.index(name) for name in (PRESSURES if site == "both" else (site,)))
+
+
+def with_gas(plant: Plant, ends: Ends, change: Callable[[Gas], Gas]) -> Plant:
+    """A plant whose gas is changed at the given ends."""
+    return plant._replace(
+        front=change(plant.front) if ends.front else plant.front,
+        rear=change(plant.rear) if ends.rear else plant.rear,
+    )

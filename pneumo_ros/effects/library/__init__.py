@@ -1,0 +1,1 @@
+"""The effects of the library, one file each, named by their id in the log and diagnosis contract."""

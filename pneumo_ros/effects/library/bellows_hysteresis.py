@@ -1,0 +1,52 @@
+"""Hysteresis of the bellows' rubber and cord: a Bouc-Wen element in parallel with the spring.
+
+Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976: z' = v/length (1 - |z|^n)
+while loading, v/length (1 + b |z|^n) while unloading; b 0 unloads elastically (equal constants), b 1 steepest. It
+differs from dry friction by its length: millimetres of travel, not a bristle's tenth.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.parameters import EffectParameter
+
+SUBSTEPS = 4  # a strut moves up to half its yield travel in a step
+
+State = tuple[float]
+Values = tuple[float, float, float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """Force over its limit, one step later, at held speed; never beyond the limit."""
+    value, move = z[0], strut.rate * dt / (SUBSTEPS * p[1])
+    for _ in range(SUBSTEPS):
+        used = abs(value) ** p[2]
+        value += move * (1.0 - used if value * move > 0.0 else 1.0 + p[3] * used)
+        value = min(max(value, -1.0), 1.0)
+    return (value,)
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: State, p: Values) -> float:
+    """Opposes the travel since the last reversal."""
+    return -p[0] * z[0]
+
+
+EFFECT = Effect(
+    id="bellows_hysteresis",
+    summary="the bellows' rubber loses energy by travel, not by speed",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("hysteresis_force", "N", 0.0, 150.0, 8.0, size=True, starts=(2.0, 30.0)),
+        EffectParameter("yield_travel", "m", 5e-4, 3e-2, 4e-3, starts=(1.5e-3,)),
+        EffectParameter("sharpness", "1", 0.7, 4.0, 1.5),
+        EffectParameter("unloading", "1", -0.3, 1.3, 0.5),
+    ),
+    term=PlantTerm(states=1, advance=advance, force=force),
+)

@@ -1,0 +1,38 @@
+"""A bump stop that meets the strut earlier, or pushes harder, than the nominal one.
+
+k d (1 + a d) (1 - c d(height)/dt) over the depth d: stiffening rubber that loses energy in every contact.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Strut
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT
+
+Values = tuple[float, float, float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: tuple[float, ...], p: Values) -> float:
+    """Push below the height of contact, upwards on the body; a stop never pulls."""
+    depth = max(0.0, BUMP_STOP_HEIGHT + p[1] - strut.height)
+    return p[0] * depth * (1.0 + p[2] * depth) * max(0.0, 1.0 - p[3] * strut.rate)
+
+
+EFFECT = Effect(
+    id="bump_stop",
+    summary="the bump stop acts earlier or harder than modelled",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("stop_stiffness", "N/m", 0.0, 1e6, 2e4, size=True, starts=(1e5,)),
+        EffectParameter("stop_lead", "m", 0.0, 0.014, 0.004, starts=(0.008, 0.012, 0.001)),
+        EffectParameter("stop_hardening", "1/m", 0.0, 1e4, 100.0),
+        EffectParameter("stop_damping", "s/m", 0.0, 2.0, 0.2),
+    ),
+    term=PlantTerm(force=force),
+)

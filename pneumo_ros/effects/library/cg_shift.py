@@ -1,0 +1,22 @@
+"""The centre of mass lies ahead of (positive) or behind where the configuration has it."""
+
+from __future__ import annotations
+
+from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+def plant(plant: Plant, ends: Ends, values: Values) -> Plant:
+    """Shortens the front arm by what the rear arm gains; the axles stay."""
+    body = plant.body
+    return plant._replace(body=body._replace(front_arm=body.front_arm - values[0], rear_arm=body.rear_arm + values[0]))
+
+
+EFFECT = Effect(
+    id="cg_shift",
+    summary="the centre of mass is not where the configuration says",
+    sites=RIG,
+    places=("body_pitch", "body_heave"),
+    parameters=(EffectParameter("cg_shift_forward", "m", -0.12, 0.12, 0.008, size=True, starts=(-0.008,)),),
+    plant=plant,
+)

@@ -1,0 +1,59 @@
+"""Dry friction of the strut's bushing: LuGre with the steady curve Fc + (Fs - Fc) exp(-(v/vs)^2).
+
+Source: Canudas de Wit, Olsson, Astrom, Lischinsky, "A new model for control of systems with friction", IEEE TAC 40(3),
+1995. The bristle state is advanced by its exact solution at held speed, so that the stiffest bristle needs no shorter
+step.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.parameters import EffectParameter
+
+STRIBECK_SPEED = 0.012  # m/s; moves the output far less than force and bristle length do
+BRISTLE_DAMPING = 15.0  # N s/m, fades with speed; keeps the stuck strut from ringing
+
+State = tuple[float]
+Values = tuple[float, float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """Bristle force over Fc, one step later: dz/dt = v/s - |v| z/(s g) with s the bristle length."""
+    if p[0] <= 0.0:
+        return (0.0,)
+    speed = abs(strut.rate)
+    ratio = speed / STRIBECK_SPEED
+    steady = 1.0 + p[2] * math.exp(-ratio * ratio)
+    fade = math.exp(-speed / (p[1] * steady) * dt)
+    target = steady if strut.rate > 0.0 else -steady
+    return (target + (z[0] - target) * fade,)
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: State, p: Values) -> float:
+    """Opposes the strut's motion; the bristle's damping only while it still bends."""
+    if p[0] <= 0.0:
+        return 0.0
+    left = max(0.0, 1.0 - abs(z[0]))
+    return -p[0] * z[0] - min(BRISTLE_DAMPING, 4.0 * p[0]) * left * strut.rate
+
+
+EFFECT = Effect(
+    id="coulomb_friction",
+    summary="dry friction between body and axle (bushing, guide), with presliding and a Stribeck peak",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("friction_force", "N", 0.0, 80.0, 6.0, size=True, starts=(1.5, 20.0)),
+        EffectParameter("bristle_length", "m", 2e-5, 8e-4, 2e-4),
+        EffectParameter("stribeck_excess", "1", 0.0, 1.0, 0.25),
+    ),
+    term=PlantTerm(states=1, advance=advance, force=force),
+)

@@ -1,0 +1,21 @@
+"""Hose and fittings add a volume that does not change with the height."""
+
+from __future__ import annotations
+
+from pneumo_ros.effects.contract import ENDS, Effect, Ends, Plant, Values, with_gas
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+def plant(plant: Plant, ends: Ends, values: Values) -> Plant:
+    """Adds to the constant part of V(h)."""
+    return with_gas(plant, ends, lambda gas: gas._replace(volume_offset=gas.volume_offset + values[0]))
+
+
+EFFECT = Effect(
+    id="dead_volume",
+    summary="volume of hose and fittings beside the spring's own",
+    sites=ENDS,
+    places=("{end}_air",),
+    parameters=(EffectParameter("dead_volume", "m3", -2e-5, 3e-4, 1e-5, size=True),),
+    plant=plant,
+)

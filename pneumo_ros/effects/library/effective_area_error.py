@@ -1,0 +1,33 @@
+"""The bellows' effective area differs from the table, in size and in its slope over height."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Strut
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.units import INCH
+
+MIDDLE = 1.8 * INCH  # m, the design height of Table 4.2: where the slope turns about
+Values = tuple[float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: tuple[float, ...], p: Values) -> float:
+    """Gauge pressure on the area that the table lacks."""
+    return strut.gauge * strut.area * (p[0] + p[1] * (strut.height - MIDDLE) / MIDDLE)
+
+
+EFFECT = Effect(
+    id="effective_area_error",
+    summary="the effective area surface is off by a factor, or leans over height",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("area_error", "1", -0.4, 0.4, 0.04, size=True, starts=(-0.04,)),
+        EffectParameter("area_slope_error", "1", -1.5, 1.5, 0.1, size=True, starts=(-0.1,)),
+    ),
+    term=PlantTerm(force=force),
+)

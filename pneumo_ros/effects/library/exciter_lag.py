@@ -1,0 +1,29 @@
+"""The road exciter follows its command as a second order lag, so that the tyre meets less road, later."""
+
+from __future__ import annotations
+
+from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
+from pneumo_ros.effects.filters import lagged_line
+from pneumo_ros.effects.parameters import Derived, EffectParameter
+
+
+def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
+    """Road heights that really act."""
+    road, memory = by_column(
+        lambda u, kept: lagged_line(u, period, values[0], values[1], kept), inputs.road, ends.columns, memory
+    )
+    return inputs._replace(road=road), memory
+
+
+EFFECT = Effect(
+    id="exciter_lag",
+    summary="the road exciter follows its command late",
+    sites=ENDS,
+    places=("road_input",),
+    parameters=(
+        EffectParameter("exciter_lag", "s", 0.0, 0.1, 0.005, size=True, starts=(0.015,)),
+        EffectParameter("exciter_damping_ratio", "1", 0.3, 2.0, 0.8),
+    ),
+    derived=(Derived("exciter_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
+    inputs=inputs,
+)

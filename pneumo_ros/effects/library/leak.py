@@ -1,0 +1,46 @@
+"""Air leaks from a spring to the atmosphere through an opening that no valve commands.
+
+Law 0 is a hole (Eq. 4.11), law 1 a long narrow gap (the laminar mass flow of a gas grows with (P^2 - Pa^2)/T); between
+them a blend.
+The area is that of the hole with the same flow at a reference pressure. No tolerance of the outlet valve scales it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Air
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT
+
+REFERENCE = 3e5  # Pa absolute
+LAMINAR = REFERENCE / (REFERENCE**2 - ATMOSPHERE**2)  # makes both laws agree there, the hole being sonic
+
+Values = tuple[float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def air(air: Air, z: tuple[float, ...], p: Values) -> float:
+    """Pressure rate of the air lost."""
+    # The hole's flow holds P and 1/sqrt(T).
+    cold = math.sqrt(air.supply_temperature / air.temperature)
+    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure) * cold
+    flow = p[0] * air.escape * (1.0 + p[1] * (gap - 1.0))
+    return -air.exponent * GAS_CONSTANT * air.temperature * flow / air.volume
+
+
+EFFECT = Effect(
+    id="leak",
+    summary="the spring or its fittings leak to the atmosphere",
+    sites=ENDS,
+    places=("{end}_air",),
+    parameters=(
+        EffectParameter("leak_area", "m2", 0.0, 5e-6, 2e-7, size=True),
+        EffectParameter("leak_law", "1", 0.0, 1.2, 0.6),
+    ),
+    term=PlantTerm(air=air),
+)

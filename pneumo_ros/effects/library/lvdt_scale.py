@@ -1,0 +1,32 @@
+"""An LVDT whose sensitivity differs from its calibration: reads (1 + error) times the height above the datum."""
+
+from __future__ import annotations
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.contract import LVDTS, Effect, Memory, Values
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+def outputs(
+    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+) -> tuple[Array, Memory]:
+    """What the sensor reports."""
+    outputs[:, channels] *= 1.0 + values[0]
+    return outputs, None
+
+
+def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
+    """What was really there."""
+    measured[:, channels] /= 1.0 + values[0]
+    return measured
+
+
+EFFECT = Effect(
+    id="lvdt_scale",
+    summary="an LVDT's sensitivity is off",
+    sites=LVDTS,
+    places=(),
+    parameters=(EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),),
+    outputs=outputs,
+    undo=undo,
+)

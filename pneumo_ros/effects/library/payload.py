@@ -1,0 +1,21 @@
+"""A load on the body that the configuration does not know, at the centre of mass."""
+
+from __future__ import annotations
+
+from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+def plant(plant: Plant, ends: Ends, values: Values) -> Plant:
+    """Adds to the sprung mass."""
+    return plant._replace(body=plant.body._replace(sprung_mass=plant.body.sprung_mass + values[0]))
+
+
+EFFECT = Effect(
+    id="payload",
+    summary="unknown load on the body",
+    sites=RIG,
+    places=("body_heave", "body_pitch"),
+    parameters=(EffectParameter("payload", "kg", -15.0, 40.0, 2.0, size=True, starts=(-2.0,)),),
+    plant=plant,
+)

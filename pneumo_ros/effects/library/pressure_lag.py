@@ -1,0 +1,32 @@
+"""A pressure sensor at the end of a tube, or slow in itself: second order lag, 1/((lag s)^2 + 2 damping lag s + 1).
+
+A short tube rings (damping below one), a long or throttled one creeps like a first order lag (damping well above it).
+"""
+
+from __future__ import annotations
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values, by_column
+from pneumo_ros.effects.filters import lagged_line
+from pneumo_ros.effects.parameters import Derived, EffectParameter
+
+
+def outputs(
+    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+) -> tuple[Array, Memory]:
+    """What the sensor reports."""
+    return by_column(lambda u, kept: lagged_line(u, period, values[0], values[1], kept), outputs, channels, memory)
+
+
+EFFECT = Effect(
+    id="pressure_lag",
+    summary="a pressure sensor reports late",
+    sites=PRESSURES_OR_BOTH,
+    places=(),
+    parameters=(
+        EffectParameter("sensor_lag", "s", 0.0, 0.2, 0.005, size=True, starts=(0.02,)),
+        EffectParameter("sensor_damping_ratio", "1", 0.3, 5.0, 0.8, starts=(2.0,)),
+    ),
+    derived=(Derived("sensor_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
+    outputs=outputs,
+)

@@ -1,0 +1,38 @@
+"""A pressure sensor whose sensitivity is off; it may pivot about vacuum (absolute cell) or the atmosphere (gauge
+cell).
+"""
+
+from __future__ import annotations
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.units import ATMOSPHERE
+
+
+def outputs(
+    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+) -> tuple[Array, Memory]:
+    """What the sensor reports."""
+    outputs[:, channels] += values[0] * (outputs[:, channels] - values[1])
+    return outputs, None
+
+
+def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
+    """What was really there."""
+    measured[:, channels] = (measured[:, channels] + values[0] * values[1]) / (1.0 + values[0])
+    return measured
+
+
+EFFECT = Effect(
+    id="pressure_scale",
+    summary="a pressure sensor's sensitivity is off",
+    sites=PRESSURES_OR_BOTH,
+    places=(),
+    parameters=(
+        EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),
+        EffectParameter("pivot_pressure", "Pa", 0.0, ATMOSPHERE, 5e4),
+    ),
+    outputs=outputs,
+    undo=undo,
+)

@@ -1,0 +1,52 @@
+"""The supply's pressure sags with the flow drawn: a tank refilled through a regulator of finite stiffness.
+
+d(drop)/dt = (resistance W - drop)/tau, W the inflow of both springs; the tank is steady at the first instant.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import RIG, Effect
+from pneumo_ros.effects.hooks import Air
+from pneumo_ros.effects.parameters import EffectParameter
+
+State = tuple[float]
+Values = tuple[float, float]
+DEEPEST = 4e5  # Pa: keeps a wild trial of the fit from a negative supply
+
+
+@njit(cache=True, error_model="numpy")
+def start(front: Air, rear: Air, p: Values) -> State:
+    """Steady sag at the first flow."""
+    return (min(p[0] * (front.inflow + rear.inflow), DEEPEST),)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, front: Air, rear: Air, dt: float, p: Values) -> State:
+    """Exact first order at held flow."""
+    target = p[0] * (front.inflow + rear.inflow)
+    fade = math.exp(-dt / max(p[1], 1e-4))
+    return (min(target + (z[0] - target) * fade, DEEPEST),)
+
+
+@njit(cache=True, error_model="numpy")
+def supply(z: State, p: Values) -> float:
+    """Pa below the regulated supply."""
+    return z[0]
+
+
+EFFECT = Effect(
+    id="supply_droop",
+    summary="the supply's pressure falls with the air drawn from it (tank, regulator, hose)",
+    sites=RIG,
+    places=("supply",),
+    parameters=(
+        EffectParameter("supply_resistance", "Pa s/kg", 0.0, 3e8, 1e7, size=True, starts=(4e7,)),
+        EffectParameter("supply_time_constant", "s", 0.002, 20.0, 0.3, starts=(0.03, 3.0)),
+    ),
+    term=PlantTerm(states=1, start=start, advance=advance, supply=supply, shared=True),
+)

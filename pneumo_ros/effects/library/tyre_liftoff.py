@@ -1,0 +1,26 @@
+"""A tyre pushes but does not pull: above the ground its force is gone (the nominal tyre is linear in both signs)."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Tyre
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+@njit(cache=True, error_model="numpy")
+def tyre(tyre: Tyre, z: tuple[float, ...], p: tuple[float]) -> float:
+    """Takes the lost share of the pull away."""
+    return -p[0] * tyre.force if tyre.compression < 0.0 else 0.0
+
+
+EFFECT = Effect(
+    id="tyre_liftoff",
+    summary="the wheel leaves the ground: no pull from the tyre",
+    sites=ENDS,
+    places=("{end}_tyre",),
+    parameters=(EffectParameter("lost_pull", "1", 0.0, 1.0, 0.9, size=True, ends=(0.0, 1.0)),),
+    term=PlantTerm(tyre=tyre),
+)

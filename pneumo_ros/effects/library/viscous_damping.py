@@ -1,0 +1,32 @@
+"""The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8).
+
+-c (1 + b |v|) v: b is how much the constant grows, or falls, with speed.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Strut
+from pneumo_ros.effects.parameters import EffectParameter
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: tuple[float, ...], p: tuple[float, float]) -> float:
+    """Against the strut's rate."""
+    return -p[0] * (1.0 + p[1] * abs(strut.rate)) * strut.rate
+
+
+EFFECT = Effect(
+    id="viscous_damping",
+    summary="viscous damping of the strut beyond its tolerance",
+    sites=ENDS,
+    places=("{end}_force",),
+    parameters=(
+        EffectParameter("added_damping", "N s/m", -60.0, 500.0, 25.0, size=True, starts=(-20.0,)),
+        EffectParameter("growth_with_speed", "s/m", -2.0, 20.0, 0.5),
+    ),
+    term=PlantTerm(force=force),
+)
