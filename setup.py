@@ -35,7 +35,7 @@ setup(
     maintainer="pneumo_ros maintainers",
     maintainer_email="maintainers@pneumo-ros.example",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.gap.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"]},
+    package_data={f"{NAME}.diagnosis.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"]},
     python_requires=">=3.10,<3.14",
     install_requires=[
         "setuptools",

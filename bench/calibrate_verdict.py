@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.gap.diagnose import TELLING
-from pneumo_ros.gap.selection import TOLL
-from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, nameless
+from pneumo_ros.diagnosis.diagnose import TELLING
+from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, nameless
+from pneumo_ros.diagnosis.search.selection import TOLL
 
 FOREIGN = ("unknown", "withheld")
 

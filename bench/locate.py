@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pneumo_ros.diagnosis.signals import read_signals
+from pneumo_ros.diagnosis.where import locate
 from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.gap.signals import read_signals
-from pneumo_ros.gap.where import locate
 
 
 def graded(chosen: tuple[str, ...], truth: set[str]) -> str:

@@ -3,7 +3,8 @@
 Each seed draws a rig inside its tolerances, simulates two logs of it (sensor noise, commands that jump between the
 rows as the logs of a 1 kHz controller do) and lets the competition run: once with no effect (what does the best single
 win over the refit?), once with one effect of the library (what does the best pair win over the best single?). The
-table goes to config/tables/diagnosis_null.csv, which :func:`pneumo_ros.gap.selection.null_thresholds` reads.
+table goes to config/tables/diagnosis_null.csv, which
+:func:`pneumo_ros.diagnosis.search.selection.null_thresholds` reads.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.search.competition import Contest, Effort, compete
+from pneumo_ros.diagnosis.search.selection import Scored, advantage, score
+from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.gap.compete import Contest, Effort, compete
-from pneumo_ros.gap.problem import Problem
-from pneumo_ros.gap.selection import Scored, advantage, score
-from pneumo_ros.gap.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 

@@ -7,8 +7,8 @@ part of this package): displacement of floor and base in mm, 250 Hz, 10 s, base 
 M = 3.0799 kg, C = 0.6690 N s/m, K = 1191 N/m between base and floor. A brass disc of 450 g presses on a wall that
 stands on the ground; its friction is not in the nominal model.
 
-The diagnosis is :func:`pneumo_ros.gap.diagnose.diagnose`, the same as for the half car. This file is all that a rig of
-your own needs: a record, a model that predicts it, and effects that might be missing.
+The diagnosis is :func:`pneumo_ros.diagnosis.diagnose.diagnose`, the same as for the half car. This file is all that a
+rig of your own needs: a record, a model that predicts it, and effects that might be missing.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from scipy.io import loadmat
 from scipy.signal import savgol_filter
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.judge.verdict import Calibration
+from pneumo_ros.diagnosis.model import PlainEffect
+from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.diagnose import Options, diagnose
-from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import PlainEffect
-from pneumo_ros.gap.verdict import Calibration
 
 FLOOR_NOISE = 2e-6  # m, laser: what fourth differences of the log show, times four for what is not white
 SUBSTEPS = 4  # RK4 at 1 ms: friction that turns over within 0.5 mm/s needs steps below 3 ms

@@ -22,14 +22,14 @@ from pathlib import Path
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.fit.problem import AVERAGED, REACH
+from pneumo_ros.diagnosis.judge.verdict import Calibration
+from pneumo_ros.diagnosis.model import PlainEffect
+from pneumo_ros.diagnosis.result import Diagnosis
+from pneumo_ros.diagnosis.search.selection import Thresholds
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.diagnose import Options, diagnose
-from pneumo_ros.gap.diagnosis import Diagnosis
-from pneumo_ros.gap.model import PlainEffect
-from pneumo_ros.gap.problem import AVERAGED, REACH
-from pneumo_ros.gap.selection import Thresholds
-from pneumo_ros.gap.verdict import Calibration
 from pneumo_ros.units import ATMOSPHERE
 
 BAR = 1e5  # Pa

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pneumo_ros.control.loop import measure
+from pneumo_ros.diagnosis.half_car.closed_loop import rerun_diagnosed
+from pneumo_ros.diagnosis.signals import Signals, read_signals
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.closed_loop import rerun_diagnosed
-from pneumo_ros.gap.signals import Signals, read_signals
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage

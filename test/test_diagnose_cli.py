@@ -12,12 +12,12 @@ from rig_logs import noisy, simulated, write_log
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.diagnose import app
+from pneumo_ros.diagnosis.half_car.from_logs import prepared
+from pneumo_ros.diagnosis.signals import read_signals
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.run import prepared
-from pneumo_ros.gap.signals import read_signals
 from pneumo_ros.rig import load_rig
 
 PAGE = Path(__file__).parent.parent / "docs" / "diagnosis.md"

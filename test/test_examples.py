@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
 import frame_friction
 import leaking_chamber
 
+from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active
-from pneumo_ros.gap.diagnosis import Diagnosis
 
 
 @pytest.fixture(scope="module")

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from rig_logs import excitation, signals_of, simulated
 
+from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.fit.command_events import timed
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit, sensitivities
+from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
+from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
+from pneumo_ros.diagnosis.search.competition import Effort, starts_elsewhere
+from pneumo_ros.diagnosis.search.screening import all_parts, promises, trials, visibility
+from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.gap.compete import Effort, starts_elsewhere
-from pneumo_ros.gap.diagnose import Options, diagnose
-from pneumo_ros.gap.events import timed
-from pneumo_ros.gap.fit import Fit, bounded_newton, fit, sensitivities
-from pneumo_ros.gap.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
-from pneumo_ros.gap.problem import Candidate, Problem
-from pneumo_ros.gap.screen import all_parts, promises, trials, visibility
-from pneumo_ros.gap.signals import Signals
-from pneumo_ros.gap.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 

@@ -10,11 +10,11 @@ import pytest
 from driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import BLOCK, SELECT_EVERY, Problem
+from pneumo_ros.diagnosis.model import EffectLike, PlainEffect
+from pneumo_ros.diagnosis.search.competition import Effort, compete
+from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
-from pneumo_ros.gap.compete import Effort, compete
-from pneumo_ros.gap.model import EffectLike, PlainEffect
-from pneumo_ros.gap.problem import BLOCK, SELECT_EVERY, Problem
-from pneumo_ros.gap.selection import Thresholds, score, select
 
 RATE, STOP, BELOW = 8.0, 30.0, 1.5
 SECONDS = 7.5  # six blocks

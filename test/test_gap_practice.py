@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.main import app
-from pneumo_ros.gap.diagnose import Options
-from pneumo_ros.gap.run import diagnose_files, prepared
-from pneumo_ros.gap.runs import held_out
+from pneumo_ros.diagnosis.diagnose import Options
+from pneumo_ros.diagnosis.half_car.from_logs import diagnose_files, prepared
+from pneumo_ros.diagnosis.judge.held_out_runs import held_out
 from pneumo_ros.rig import load_rig
 
 

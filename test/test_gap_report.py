@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 from rig_logs import signals_of, simulated
 
+from pneumo_ros.diagnosis.report import Findings, render, write_outputs, write_report, write_residual_log
+from pneumo_ros.diagnosis.report.contents import readable, rounded
+from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
+from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
+from pneumo_ros.diagnosis.report.words import confidence, headline, next_steps, place_words
+from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
+from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.diagnosis import Diagnosis, Estimate, Gap, Ranked
-from pneumo_ros.gap.report import Findings, render, write_outputs, write_report, write_residual_log
-from pneumo_ros.gap.report.contents import readable, rounded
-from pneumo_ros.gap.report.plots import Line, plot, thinned, ticks
-from pneumo_ros.gap.report.rig_map import colour, draw_map
-from pneumo_ros.gap.report.words import confidence, headline, next_steps, place_words
-from pneumo_ros.gap.signals import MEASURED
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import load_rig
 

@@ -10,13 +10,13 @@ import pytest
 from driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
+from pneumo_ros.diagnosis.fit.solver import fit
+from pneumo_ros.diagnosis.model import EffectLike
+from pneumo_ros.diagnosis.search.competition import Effort, compete
 from pneumo_ros.effects.parameters import Active, Parameter
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.compete import Effort, compete
-from pneumo_ros.gap.fit import fit
-from pneumo_ros.gap.model import EffectLike
-from pneumo_ros.gap.problem import Candidate, Problem
-from pneumo_ros.gap.shooting import astray, fit_from_windows
 
 TRUE_GROWTH = 1.5
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rig_logs import DISPLACEMENT_NOISE, PRESSURE_NOISE, RATE, simulated, topics, write_log
 
+from pneumo_ros.diagnosis.signals import MEASURED, Signals, TopicData, check_pair, prepare, read_signals
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, check_pair, prepare, read_signals
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 from pneumo_ros.units import ATMOSPHERE

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.main import app
-from pneumo_ros.gap.bench_tables import TableDiagnosis, diagnose_table, diagnose_tables
-from pneumo_ros.gap.bench_tables.data import load_bench
-from pneumo_ros.gap.bench_tables.laws import DAMPING_LAWS, natural_frequency
+from pneumo_ros.thesis.bench_tables import TableDiagnosis, diagnose_table, diagnose_tables
+from pneumo_ros.thesis.bench_tables.data import load_bench
+from pneumo_ros.thesis.bench_tables.laws import DAMPING_LAWS, natural_frequency
 from pneumo_ros.thesis.models.moving_base import bench_at
 from pneumo_ros.thesis.models.moving_base import natural_frequency as simulated_frequency
 

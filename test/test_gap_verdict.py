@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pneumo_ros.gap.ambiguity import ambiguity_group
-from pneumo_ros.gap.fit import Fit
-from pneumo_ros.gap.problem import Candidate
-from pneumo_ros.gap.selection import Scored, Thresholds, select
-from pneumo_ros.gap.verdict import Calibration, HeldOutGaps, Opinion, judge
+from pneumo_ros.diagnosis.fit.problem import Candidate
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
+from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge
+from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, select
 
 CALM = HeldOutGaps(1.1, 1.1)
 LIMITS = Thresholds()

@@ -12,11 +12,8 @@ import pytest
 from rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
-from pneumo_ros.effects.composition import CORRECTIONS
-from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.gap.signals import MEASURED, Signals, TopicData, prepare, read_signals
-from pneumo_ros.gap.where import (
+from pneumo_ros.diagnosis.signals import MEASURED, Signals, TopicData, prepare, read_signals
+from pneumo_ros.diagnosis.where import (
     Start,
     conditional_gaps,
     flexible_gain,
@@ -25,13 +22,16 @@ from pneumo_ros.gap.where import (
     place_gaps,
     predict_located,
 )
-from pneumo_ros.gap.where.along import explained
-from pneumo_ros.gap.where.design import car_of, design_of, inputs_of, sensor_noise
-from pneumo_ros.gap.where.locate import corrected_residual
-from pneumo_ros.gap.where.regimes import bands, harmonics, regimes
-from pneumo_ros.gap.where.sets import best_subset, rivals, shapley, smallest
-from pneumo_ros.gap.where.solve import Rows, box_minimum, forms_of
-from pneumo_ros.gap.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
+from pneumo_ros.diagnosis.where.design import car_of, design_of, inputs_of, sensor_noise
+from pneumo_ros.diagnosis.where.locate import corrected_residual
+from pneumo_ros.diagnosis.where.path_share import explained
+from pneumo_ros.diagnosis.where.regimes import bands, harmonics, regimes
+from pneumo_ros.diagnosis.where.sets import best_subset, rivals, shapley, smallest
+from pneumo_ros.diagnosis.where.solve import Rows, box_minimum, forms_of
+from pneumo_ros.diagnosis.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
+from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig

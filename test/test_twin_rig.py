@@ -13,18 +13,18 @@ from sessions import run
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
+from pneumo_ros.diagnosis.diagnose import Options
+from pneumo_ros.diagnosis.half_car.from_logs import prepared
+from pneumo_ros.diagnosis.half_car.saved_rig import corrected_rig, save_corrected_rig
+from pneumo_ros.diagnosis.judge.held_out_runs import held_out
+from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap
+from pneumo_ros.diagnosis.signals import Signals, check_pair
 from pneumo_ros.effects.corrected_rig import TwinRig, diagnosed_rig
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import COMMAND_DELAY, RigModel
 from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.errors import InputError, PneumoError
-from pneumo_ros.gap.diagnose import Options
-from pneumo_ros.gap.diagnosis import Diagnosis, Estimate, Gap
-from pneumo_ros.gap.run import prepared
-from pneumo_ros.gap.runs import held_out
-from pneumo_ros.gap.saved_rig import corrected_rig, save_corrected_rig
-from pneumo_ros.gap.signals import Signals, check_pair
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.stepping import PlainRig, SteppedRig
 from pneumo_ros.plant.trim import trim

@@ -44,7 +44,7 @@ def _commit() -> str:
 
 
 def _diagnosis(case: Path, withhold: tuple[str, ...]) -> dict[str, object]:
-    from pneumo_ros.gap.run import diagnose_files
+    from pneumo_ros.diagnosis.half_car.from_logs import diagnose_files
 
     found = diagnose_files([case / "fit.mcap"], case / "holdout.mcap", edit=case / "edit.mcap", without=list(withhold))
     return dict(found.to_json())

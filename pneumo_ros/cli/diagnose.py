@@ -14,8 +14,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from pneumo_ros.gap.diagnosis import Diagnosis, EditTest
-    from pneumo_ros.gap.signals import Signals
+    from pneumo_ros.diagnosis.result import Diagnosis, EditTest
+    from pneumo_ros.diagnosis.signals import Signals
 
 app = typer.Typer(add_completion=False)
 SHARE_SHOWN = 0.05
@@ -80,11 +80,11 @@ def diagnose(
     if not fit or output is None:
         missing = "no log to fit" if not fit else "no folder for the diagnosis"
         raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
-    from pneumo_ros.gap.diagnose import Options
-    from pneumo_ros.gap.experiment import design_experiment
-    from pneumo_ros.gap.report import claim_folder, write_outputs
-    from pneumo_ros.gap.run import prepared
-    from pneumo_ros.gap.saved_rig import save_corrected_rig
+    from pneumo_ros.diagnosis.diagnose import Options
+    from pneumo_ros.diagnosis.half_car.experiment import design_experiment
+    from pneumo_ros.diagnosis.half_car.from_logs import prepared
+    from pneumo_ros.diagnosis.half_car.saved_rig import save_corrected_rig
+    from pneumo_ros.diagnosis.report import claim_folder, write_outputs
     from pneumo_ros.rig import load_rig
 
     claim_folder(output)
@@ -111,7 +111,7 @@ def diagnose(
 
 def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: Sequence[Signals]) -> None:
     """Verdict, how sure, where, how far; the head of the ranking; notes; what to do next."""
-    from pneumo_ros.gap.report.words import confidence, headline, how_far, next_steps, place_words
+    from pneumo_ros.diagnosis.report.words import confidence, headline, how_far, next_steps, place_words
 
     summary = found.to_json()
     console.print(f"[bold]{escape(headline(summary, phrases))}[/bold]", soft_wrap=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.gap.bench_tables import Judged, TableDiagnosis, diagnose_tables
+from pneumo_ros.thesis.bench_tables import Judged, TableDiagnosis, diagnose_tables
 
 TITLES = {
     "frequency": "Table 5.4, natural frequency",

@@ -225,8 +225,8 @@ def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | No
 
 def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path, rig: Path | None) -> Rerun:
     """On the rig as diagnosed; ``rig`` is the one that the diagnosis was told, if it was told one."""
-    from pneumo_ros.gap.closed_loop import rerun_diagnosed
-    from pneumo_ros.gap.signals import read_signals
+    from pneumo_ros.diagnosis.half_car.closed_loop import rerun_diagnosed
+    from pneumo_ros.diagnosis.signals import read_signals
     from pneumo_ros.log.inspection import read_setups, seed_of
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.replay import plan

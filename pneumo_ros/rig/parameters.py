@@ -81,7 +81,7 @@ END_LIMITS: dict[str, Limit] = {
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that a diagnosis found in the rig; what ids, sites and parameters mean is in pneumo_ros/gap/effects.
+    """An effect that a diagnosis found in the rig; what ids, sites and parameters mean is in pneumo_ros/effects.
 
     Attributes
     ----------

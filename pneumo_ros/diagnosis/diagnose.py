@@ -1,0 +1,251 @@
+"""The diagnosis from end to end: logs in, verdict with places, ranking and held-out gaps out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
+from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
+from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
+from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_gap
+from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
+from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
+from pneumo_ros.diagnosis.judge.ranking import rank
+from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
+from pneumo_ros.diagnosis.search.competition import Contest, Effort, Progress, compete
+from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
+from pneumo_ros.diagnosis.where.effect_shares import effect_shares
+from pneumo_ros.effects.parameters import Active
+
+Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
+TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
+SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
+MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
+SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a diagnosis does.
+
+    Attributes
+    ----------
+    pairs : look for two effects as well
+    effort : how many candidates are fitted
+    limits : what counts as evidence
+    calibration : constants of the probabilities
+    locate : (model, fit logs, held-out log, nuisance or None for nominal, active) -> :class:`Whereabouts` of what that
+        structure leaves
+    experiment : design the experiment that splits an ambiguity group
+    """
+
+    pairs: bool = True
+    effort: Effort = field(default_factory=Effort)
+    limits: Thresholds = field(default_factory=null_thresholds)
+    calibration: Calibration = field(default_factory=Calibration)
+    locate: Locate | None = None
+    experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None
+
+
+def diagnose(
+    model: Model,
+    fit_logs: Sequence[Any],
+    holdout: Any,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    edit: Any | None = None,
+) -> Diagnosis:
+    """Diagnose logs with a model.
+
+    Parameters
+    ----------
+    model : :class:`pneumo_ros.effects.rig_model.RigModel` for the half car
+    fit_logs : records to fit, see :class:`pneumo_ros.diagnosis.model.Record`
+    holdout : record that nothing is fitted to
+    progress : called with the share done and what is being done
+    edit : a record of the rig after a known change, predicted without refitting
+    """
+    options = options or Options()
+    tell = progress or (lambda share, what: None)
+    contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
+    tell(0.9, "selecting and checking on the held-out log")
+    outcome = _outcome(contest, holdout, options, tell)
+    held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
+    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, walls)
+    return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
+
+
+def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Outcome:
+    problem = contest.problem
+    refit = score(problem, contest.refit)
+    finalists = tuple(score(problem, f) for f in contest.finalists)
+    chosen = select(refit, finalists, options.limits)
+    everything = np.ones(len(problem.measured), dtype=bool)
+    base = _final(problem, contest.refit, everything)
+    best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
+    runs = held_runs(problem, base, best, holdout)
+    tell(0.93, "locating")
+    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
+    before, after = _whereabouts(found, options.locate)
+    return replace(found, before=before, after=after)
+
+
+def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
+    """What the logs' own limitations leave of the verdict."""
+    limitations = [(r.name, one) for r in records for one in getattr(r, "limitations", ())]
+    if not limitations:
+        return found
+    notes = (*found.notes, *dict.fromkeys(f"{name}: {one.text}" for name, one in limitations))
+    cap = min(one.cap for _, one in limitations)
+    blocked = any(getattr(r, "blocked", False) for r in records)
+    verdict = "not_testable" if blocked else found.verdict
+    cap = 0.0 if blocked else cap
+    ranking = tuple(replace(one, probability=min(one.probability, cap)) for one in found.ranking)
+    return replace(found, verdict=verdict, probability=min(found.probability, cap), ranking=ranking, notes=notes)
+
+
+def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
+    """The last log's end becomes the held-out record (with an initial state of its own)."""
+    last = fit_logs[-1]
+    cut = int(len(last.measured) * SPLIT)
+    return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
+
+
+def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
+    problem, contest, holdout, best = outcome.problem, outcome.contest, outcome.holdout, outcome.best
+    tell(0.95, "ranking")
+    ranking = rank(outcome, opinion)
+    group = ambiguity_group(problem, opinion, outcome.finalists)
+    location = _location(outcome, opinion)
+    experiment = None
+    if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
+        tell(0.97, "designing the next experiment")
+        experiment = _next_experiment(outcome, opinion, group, options.experiment)
+    cov = covariance(problem, best)
+    tell(1.0, "done")
+    hidden = _hidden(problem, contest)
+    blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)
+    return Diagnosis(
+        verdict="not_testable" if blind else opinion.verdict,
+        probability=opinion.probability,
+        location=tuple(location),
+        ranking=tuple(ranking),
+        ambiguity_group=group,
+        gap=_gap(problem.model, holdout, outcome.runs),
+        nuisance=nuisance_estimates(problem, best, cov),
+        active=outcome.active,
+        not_testable=hidden,
+        experiment=experiment,
+        edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
+        notes=tuple(_notes(contest, best, problem)),
+        logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
+        tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
+        evidence=_evidence(outcome),
+        trajectories=_trajectories(holdout, outcome.runs),
+    )
+
+
+def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
+    """Fitted once more on all blocks, with fresh sensitivities."""
+    again = fit(problem, one.candidate, one.x, one.jacobian, rows=rows, iterations=4)
+    return sensitivities(problem, again)
+
+
+def _on_held_out(outcome: Outcome) -> HeldOutGaps:
+    floor = total_gap(noise_floor(outcome.holdout))
+    before, after, runs = outcome.before, outcome.after, outcome.runs
+    told = before is not None and before.left > TELLING
+    kept = after.kept if told and after is not None else None
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
+
+
+def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
+    floor = noise_floor(holdout)
+    table = {name: run.channels for name, run in runs.items()} | {"noise_floor": floor}
+    per_channel = {c: {name: float(v[k]) for name, v in table.items()} for k, c in enumerate(model.channels)}
+    totals = {name: run.total for name, run in runs.items()}
+    return Gap(totals["nominal"], totals["refit"], totals["best"], total_gap(floor), per_channel)
+
+
+def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts | None, Whereabouts | None]:
+    """Of what the nominal structure leaves, and of what the best named one leaves.
+
+    The first starts at the nominal values: the search answers the tolerances itself, while those of the free-run refit
+    have bent to the gap already.
+    """
+    if locate is None:
+        return None, None
+    problem, holdout = outcome.problem, outcome.holdout
+    before = locate(problem.model, problem.records, holdout, None, ())
+    if outcome.best is outcome.base:
+        return before, before
+    return before, locate(problem.model, problem.records, holdout, outcome.nuisance, outcome.active)
+
+
+def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
+    """A named effect's own places; else the places where a flexible correction of the nominal model helps.
+
+    Not of the best named structure: a wrong name has bent the model where it acts.
+    """
+    model, holdout, runs = outcome.problem.model, outcome.holdout, outcome.runs
+    if opinion.verdict != "unknown" and outcome.active:
+        initial = settle(model, holdout, outcome.nuisance, outcome.active)
+        closed = max(0.0, 1.0 - runs["best"].total / runs["refit"].total)
+        return effect_shares(model, holdout, outcome.nuisance, initial, outcome.active, closed)
+    before = outcome.before
+    return [] if before is None else [(place, float(np.clip(share, 0.0, 1.0))) for place, share in before.shares]
+
+
+def _evidence(outcome: Outcome) -> dict[str, float]:
+    """Numbers the verdict rests on."""
+    chosen = outcome.chosen
+    out = {"level_refit": outcome.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
+    out |= {"walls": float(at_bounds(outcome.problem, chosen.fit))}
+    for name, one in (("refit", outcome.before), ("chosen", outcome.after)):
+        if one is not None:
+            out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
+            out |= {} if one.kept is None else {f"kept_{name}": one.kept}
+    return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
+
+
+def _next_experiment(
+    outcome: Outcome, opinion: Opinion, group: Sequence[str], design: Callable[[Problem, Fit, Fit], Experiment | None]
+) -> Experiment | None:
+    """Split the verdict from its strongest rival."""
+    names = [(name_of(s.fit.candidate), s) for s in outcome.finalists]
+    rivals = [s for name, s in names if name in group and name != opinion.verdict]
+    if not rivals:
+        return None
+    return design(outcome.problem, outcome.best, min(rivals, key=lambda s: s.level).fit)
+
+
+def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:
+    notes = [f"{label}: the fit diverged, the candidate lost" for label in contest.lost]
+    low, high = problem.bounds(best.candidate)
+    for m, p in enumerate(problem.model.parameters):
+        if best.x[m] in (low[m], high[m]):
+            notes.append(f"{p.name} stands at the edge of its tolerance")
+    return notes
+
+
+def _hidden(problem: Problem, contest: Contest) -> dict[str, str]:
+    """Effects that this excitation could not have shown, with how little their typical size would have moved."""
+    out = {}
+    for name, moved in contest.visible.items():
+        if moved < SEEN:
+            sizes = [f"{p.name} {p.typical:.3g} {p.unit}" for p in problem.model.effects[name].parameters if p.size]
+            out[name] = f"{' or '.join(sizes)} would have moved the outputs by {moved:.2g} sigma only"
+    return out
+
+
+def _trajectories(holdout: Any, runs: Mapping[str, HeldOut]) -> dict[str, Array]:
+    time = np.arange(len(holdout.measured)) * holdout.period
+    return {"time": time, "log": np.asarray(holdout.measured), **{name: run.predicted for name, run in runs.items()}}

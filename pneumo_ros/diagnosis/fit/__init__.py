@@ -1,0 +1,1 @@
+"""Free-running simulation fitted to logs: the problem, the solver, windows, command events, uncertainty."""

@@ -1,0 +1,243 @@
+"""A fit's data and unknowns: logs averaged to fit samples, weights, and the vector of scaled unknowns.
+
+Unknowns, in this order, each scaled to order one: nuisance parameters in prior sigmas, initial-state corrections of
+every log in prior sigmas, effect values in their typical sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.effects.parameters import Active, EffectParameter
+
+AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
+MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
+COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
+REACH = 3.0  # prior sigmas that a nuisance parameter may move
+INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
+BLOCK = 1.25  # s, length of a time block
+SELECT_EVERY = 3  # of so many blocks in turn, one is kept from the fit and used for selection
+
+Part = tuple[str, str]  # effect id, site
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of effects at sites; empty: the nominal structure re-estimated."""
+
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Short name, for progress and messages."""
+        return " + ".join(f"{e}:{s}" if s else e for e, s in self.parts) or "none"
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Model, logs and what is fixed about a fit.
+
+    Attributes
+    ----------
+    model : a :class:`~pneumo_ros.diagnosis.model.Model`
+    records : logs to fit
+    averaged : log samples in one fit sample
+    turn : which of every :data:`SELECT_EVERY` blocks is kept from the fit
+    """
+
+    model: Model
+    records: tuple[Any, ...]
+    averaged: int = AVERAGED
+    turn: int = SELECT_EVERY - 1
+    _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def states(self) -> int:
+        """Length of the initial state."""
+        return len(self.model.initial(self.records[0], ())[0])
+
+    @cached_property
+    def fixed(self) -> int:
+        """Number of unknowns that every candidate has: nuisance and initial states."""
+        return len(self.model.parameters) + self.states * len(self.records)
+
+    @cached_property
+    def measured(self) -> Array:
+        """(n, C) averaged measurements of all logs, one after the other."""
+        return np.vstack([self._averaged(k, r.measured) for k, r in enumerate(self.records)])
+
+    @cached_property
+    def weight(self) -> Array:
+        """(n, C) 1/sigma, zero where no sample is there: noise after averaging and the model-form floor together."""
+        form = np.vstack(
+            [
+                np.tile(MODEL_FORM_FLOOR * scale_of(r), (len(n), 1))
+                for r, n in zip(self.records, self._real, strict=True)
+            ]
+        )
+        sigma = np.hypot(self.noise, form)
+        there = np.vstack([real.any(axis=1) for real in self._real])
+        return np.asarray(there / np.where(sigma > 0.0, sigma, np.inf))
+
+    @cached_property
+    def noise(self) -> Array:
+        """(n, C) standard deviation of the sensor noise after averaging."""
+        pairs = zip(self.records, self._real, strict=True)
+        return np.vstack([np.asarray(r.noise) / np.sqrt(np.maximum(real.sum(axis=1), 1.0)) for r, real in pairs])
+
+    @cached_property
+    def _real(self) -> list[Array]:
+        """For each log (n, averaged, C): 1 where a real sample stands behind the row's value."""
+        return [grouped(np.asarray(r.weight), self.averaged) for r in self.records]
+
+    @cached_property
+    def _shares(self) -> list[Array | None]:
+        """For each log, what each row counts in its average: only real samples do, in log and prediction alike, so that
+        a channel at a slower rate is compared where it was sampled. None where every sample is there."""
+        out: list[Array | None] = []
+        for real in self._real:
+            total = real.sum(axis=1, keepdims=True)
+            whole = bool(np.all(real == 1.0))
+            out.append(None if whole else np.where(total > 0.0, real / np.maximum(total, 1.0), 1.0 / self.averaged))
+        return out
+
+    def _averaged(self, k: int, samples: Array) -> Array:
+        """Fit samples of rows of log ``k``."""
+        shares = self._shares[k]
+        if shares is None:
+            return average(samples, self.averaged)
+        return np.asarray(np.einsum("nac,nac->nc", grouped(samples, self.averaged), shares))
+
+    @cached_property
+    def block(self) -> NDArray[np.int64]:
+        """(n,) number of the time block of each fit sample, running on from log to log."""
+        blocks, first = [], 0
+        for r in self.records:
+            time = np.arange(len(r.measured) // self.averaged) * self.averaged * r.period
+            count = max(1, round(float(time[-1] + self.averaged * r.period) / BLOCK))
+            index = np.minimum((time / (time[-1] + 1e-12) * count).astype(np.int64), count - 1)
+            blocks.append(first + index)
+            first += count
+        return np.concatenate(blocks)
+
+    @cached_property
+    def fitted(self) -> Mask:
+        """(n,) samples that the fit sees; the others are for selection."""
+        return self.block % SELECT_EVERY != self.turn
+
+    def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
+        """Parameters of all its effects, in order."""
+        return tuple(p for effect, _ in candidate.parts for p in self.model.effects[effect].parameters)
+
+    def active(self, candidate: Candidate, values: Array) -> tuple[Active, ...]:
+        """Its effects with values (SI)."""
+        out, first = [], 0
+        for effect, site in candidate.parts:
+            count = len(self.model.effects[effect].parameters)
+            out.append(Active(effect, site, tuple(float(v) for v in values[first : first + count])))
+            first += count
+        return tuple(out)
+
+    def bounds(self, candidate: Candidate) -> tuple[Array, Array]:
+        """Lower and upper bounds of the scaled unknowns."""
+        parameters = self.effect_parameters(candidate)
+        count = len(self.model.parameters)
+        free = np.full(self.fixed - count, np.inf)
+        reach = np.full(count, REACH)
+        low = np.array([p.low / p.typical for p in parameters])
+        high = np.array([p.high / p.typical for p in parameters])
+        return np.concatenate([-reach, -free, low]), np.concatenate([reach, free, high])
+
+    def start(self, candidate: Candidate, fixed: Array | None, values: Sequence[float]) -> Array:
+        """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""
+        scaled = [v / p.typical for v, p in zip(values, self.effect_parameters(candidate), strict=True)]
+        return np.concatenate([np.zeros(self.fixed) if fixed is None else fixed, scaled])
+
+    def values(self, candidate: Candidate, x: Array) -> Array:
+        """Effect values, SI."""
+        return x[self.fixed :] * np.array([p.typical for p in self.effect_parameters(candidate)])
+
+    def nuisance(self, x: Array) -> Array:
+        """Nuisance values, SI."""
+        parameters = self.model.parameters
+        return np.array([p.nominal + p.std * v for p, v in zip(parameters, x, strict=False)])
+
+    def predict(self, candidate: Candidate, x: Array) -> Array:
+        """(n, C) averaged prediction of all logs."""
+        nuisance, active = self.nuisance(x), self.active(candidate, self.values(candidate, x))
+        out = []
+        for k, record in enumerate(self.records):
+            initial, std = self.model.initial(record, active)
+            first = len(self.model.parameters) + k * self.states
+            initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
+            out.append(self._averaged(k, self.model.predict(record, nuisance, initial, active)))
+        return np.vstack(out)
+
+    def gap(self, residual: Array) -> float:
+        """Normalised gap on the fitted logs (averaged samples) of a residual in sigmas."""
+        sigma = np.where(self.weight > 0.0, 1.0 / np.maximum(self.weight, 1e-300), 0.0)
+        scale = np.mean([scale_of(r) for r in self.records], axis=0)
+        there = np.maximum((self.weight > 0.0).sum(axis=0), 1)
+        return float(np.sqrt(np.mean(np.sum((residual * sigma / scale) ** 2, axis=0) / there)))
+
+    @cached_property
+    def coarse_records(self) -> tuple[Any, ...] | None:
+        """The logs at half the rate, if the model knows how: good enough for sensitivities at half the cost."""
+        coarse = getattr(self.model, "coarse", None)
+        if coarse is None or any(r.period > COARSE_BELOW for r in self.records):
+            return None
+        return tuple(coarse(r) for r in self.records)
+
+    def predict_coarse(self, candidate: Candidate, x: Array) -> Array:
+        """(n, C) as :meth:`predict`, from the coarse logs."""
+        if self.coarse_records is None:
+            return self.predict(candidate, x)
+        nuisance, active = self.nuisance(x), self.active(candidate, self.values(candidate, x))
+        out = []
+        for k, (record, whole) in enumerate(zip(self.coarse_records, self.records, strict=True)):
+            initial, std = self.model.initial(whole, active)
+            first = len(self.model.parameters) + k * self.states
+            initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
+            rows = self.model.predict(record, nuisance, initial, active)
+            out.append(self._averaged(k, _between(rows, len(whole.measured))))
+        return np.vstack(out)
+
+    def residual(self, candidate: Candidate, x: Array) -> Array:
+        """(n, C) measured - predicted, in sigmas."""
+        return (self.measured - self.predict(candidate, x)) * self.weight
+
+
+def _between(rows: Array, count: int) -> Array:
+    """Every other row given: the ones between by linear interpolation, ``count`` rows in all."""
+    out = np.empty((2 * len(rows) + 1, rows.shape[1]))
+    out[:-1:2] = rows
+    out[1:-2:2] = 0.5 * (rows[:-1] + rows[1:])
+    out[-2:] = rows[-1]
+    return out[:count]
+
+
+def grouped(samples: Array, count: int) -> Array:
+    """Rows in groups of ``count``, (n, count, C); a remainder is dropped."""
+    whole = len(samples) // count
+    return samples[: whole * count].reshape(whole, count, -1)
+
+
+def average(samples: Array, count: int) -> Array:
+    """Means of ``count`` rows; a remainder is dropped."""
+    return np.asarray(np.add.reduce(grouped(samples, count), axis=1) * (1.0 / count))
+
+
+def scale_of(record: Any) -> Array:
+    """Std of the log's channels, what the gap is normalised by; a constant channel counts as its noise."""
+    own = getattr(record, "scale", None)
+    if own is not None:
+        return np.maximum(own, np.maximum(record.noise, 1e-12))
+    return np.maximum(np.std(record.measured, axis=0), np.maximum(record.noise, 1e-12))

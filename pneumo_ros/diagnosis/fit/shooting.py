@@ -1,0 +1,60 @@
+"""Multiple shooting: a start for the fit where the free run goes astray.
+
+A free run that diverges, or ends up further from the log than the log's own mean, tells a fit nothing about where to
+go. Short windows, each with an initial state of its own, stay near the data whatever the parameters (Bock 1983). What
+they find is the start of a free-run fit and no more: candidates are compared by free runs only.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import BLOCK, SELECT_EVERY, Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.model import Record
+
+WINDOWS = 2  # in a time block
+ASTRAY = 1.0  # normalised gap of a free run that is worse than the log's own mean
+
+
+@runtime_checkable
+class Sliceable(Record, Protocol):
+    """A record that can be cut."""
+
+    def slice(self, first: int, last: int) -> Any:
+        """Rows ``first`` to ``last`` (excluded) with an initial state estimated anew."""
+
+
+def astray(problem: Problem, state: Fit) -> bool:
+    """Whether a fit's free run is no use."""
+    return state.diverged or problem.gap(state.residual.clip(-1e6, 1e6)) > ASTRAY
+
+
+def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, iterations: int) -> Fit | None:
+    """A free-run fit that starts from what windows of the fitted blocks say; None if they cannot be cut or diverge."""
+    pieces = [piece for record in problem.records for piece in _windows(record, problem.turn)]
+    if not pieces:
+        return None
+    short = Problem(problem.model, tuple(pieces), problem.averaged)
+    shared = len(problem.model.parameters)
+    own = np.concatenate([start[:shared], np.zeros(short.fixed - shared), start[problem.fixed :]])
+    found = fit(short, candidate, own, rows=np.ones(len(short.measured), dtype=bool), iterations=iterations)
+    if found.diverged:
+        return None
+    free = np.zeros(problem.fixed - shared)
+    begin = np.concatenate([found.x[:shared], free, found.x[short.fixed :]])
+    return fit(problem, candidate, begin, iterations=iterations)
+
+
+def _windows(record: Any, turn: int) -> list[Any]:
+    """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
+    if not isinstance(record, Sliceable):
+        return []
+    rows = len(record.measured)
+    count = max(1, round(rows * record.period / BLOCK))
+    edges = np.linspace(0, rows, WINDOWS * count + 1).astype(int)
+    seen = [k for k in range(WINDOWS * count) if (k // WINDOWS) % SELECT_EVERY != turn]
+    return [record.slice(int(edges[k]), int(edges[k + 1])) for k in seen]

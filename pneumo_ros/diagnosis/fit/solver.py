@@ -1,0 +1,202 @@
+"""Bounded robust least squares on the free-run error, by a projected Levenberg-Marquardt of its own.
+
+The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and
+its samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the
+weight of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
+down-weighted (Huber) at a threshold that follows the misfit.
+
+Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
+between candidates and are taken over from the refit until a step disappoints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+
+CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
+HUBER = 4.0  # robust sigmas
+STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
+CENTRAL = 2e-3  # half width of the central differences
+TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
+NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
+COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
+START_DAMPING, MOST_DAMPING = 1e-4, 1e6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A candidate with its best unknowns.
+
+    Attributes
+    ----------
+    candidate : what was fitted
+    x : scaled unknowns, see :mod:`pneumo_ros.diagnosis.fit.problem`
+    cost : value of the cost on the fitted samples; inf when it diverged
+    residual : (n, C) in sigmas, all samples
+    jacobian : (n, C, m) derivative of the residual, the latest used; None before one is needed
+    simulations : how many were spent
+    """
+
+    candidate: Candidate
+    x: Array
+    cost: float
+    residual: Array
+    jacobian: Array | None = None
+    simulations: int = 0
+
+    @property
+    def diverged(self) -> bool:
+        """No finite prediction was found."""
+        return not np.isfinite(self.cost)
+
+
+def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
+    """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
+    r = residual[rows]
+    if not np.all(np.isfinite(r)):
+        return np.inf
+    limit = HUBER * robust_scale(r)
+    magnitude = np.abs(r)
+    rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
+    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + x[:fixed] @ x[:fixed])
+
+
+def robust_scale(residual: Array) -> float:
+    """1.4826 times the median magnitude, at least one."""
+    return max(1.0, 1.4826 * float(np.median(np.abs(residual))))
+
+
+def fit(
+    problem: Problem,
+    candidate: Candidate,
+    start: Array,
+    jacobian: Array | None = None,
+    rows: Mask | None = None,
+    iterations: int = 10,
+    probe: bool = False,
+) -> Fit:
+    """Best unknowns from one start.
+
+    Parameters
+    ----------
+    start : scaled unknowns
+    jacobian : (n, C, >= fixed) sensitivities whose fixed columns serve the first step
+    rows : fitted samples; the problem's by default
+    probe : borrow the fixed columns for every step: a tenth of the cost, for a first look at a candidate
+    """
+    rows = problem.fitted if rows is None else rows
+    bounds = problem.bounds(candidate)
+    state = _evaluate(problem, candidate, np.clip(start, *bounds), rows)
+    if state.diverged:
+        return state
+    borrowed = None if jacobian is None else jacobian[:, :, : problem.fixed]
+    damping, failed = START_DAMPING, False
+    for _ in range(iterations):
+        columns = _jacobian(problem, state, borrowed)
+        state = replace(state, jacobian=columns, simulations=state.simulations + _spent(columns, borrowed))
+        better, damping = _step(problem, state, rows, bounds, damping)
+        gained, moved = state.cost - better.cost, float(np.max(np.abs(better.x - state.x)))
+        state = replace(better, jacobian=columns)
+        if gained < TOLERANCE:
+            if borrowed is None or failed or probe:
+                break
+            failed = True
+        if not probe:
+            borrowed = columns[:, :, : problem.fixed] if moved < NEAR and gained >= TOLERANCE else None
+        damping = damping if gained >= TOLERANCE else START_DAMPING
+    return state
+
+
+def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
+    residual = problem.residual(candidate, x)
+    return Fit(candidate, x, cost_of(residual, rows, x, problem.fixed), residual, None, spent + 1)
+
+
+def _spent(columns: Array, borrowed: Array | None) -> int:
+    return columns.shape[2] - (0 if borrowed is None else borrowed.shape[2])
+
+
+def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
+    """Forward differences, towards the inside of the bounds."""
+    _, high = problem.bounds(state.candidate)
+    first = 0 if borrowed is None else borrowed.shape[2]
+    columns = np.empty((*state.residual.shape, len(state.x)))
+    if borrowed is not None:
+        columns[:, :, :first] = borrowed
+    here = problem.predict_coarse(state.candidate, state.x)
+    for m in range(first, len(state.x)):
+        step = STEP if state.x[m] + STEP <= high[m] else -STEP
+        moved = state.x.copy()
+        moved[m] += step
+        column = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
+        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+    return columns
+
+
+def sensitivities(problem: Problem, state: Fit) -> Fit:
+    """The fit with central differences of the full model: for what is reported, where degenerate directions matter."""
+    columns = np.empty((*state.residual.shape, len(state.x)))
+    low, high = problem.bounds(state.candidate)
+    for m in range(len(state.x)):
+        ends = [float(np.clip(state.x[m] + s, low[m], high[m])) for s in (CENTRAL, -CENTRAL)]
+        one = np.arange(len(state.x)) == m
+        up, down = (problem.residual(state.candidate, np.where(one, end, state.x)) for end in ends)
+        column = (up - down) / (ends[0] - ends[1])
+        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+    return replace(state, jacobian=columns)
+
+
+def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float) -> tuple[Fit, float]:
+    """The first of a few ever more damped steps that gains."""
+    low, high = bounds
+    H, g = normal_equations(problem, state, rows)
+    for _ in range(5):
+        move = bounded_newton(H + damping * np.diag(np.diag(H)), g, low - state.x, high - state.x)
+        if np.max(np.abs(move)) < 1e-6:
+            break
+        trial = _evaluate(problem, state.candidate, state.x + move, rows, state.simulations)
+        if trial.cost < state.cost:
+            return trial, max(damping / 10.0, 1e-6)
+        state = replace(state, simulations=trial.simulations)
+        damping = min(damping * 30.0, MOST_DAMPING)
+    return state, damping
+
+
+def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, Array]:
+    """Curvature and gradient of half the cost at a fit that has its jacobian: (m, m) and (m,)."""
+    assert state.jacobian is not None
+    r = state.residual[rows]
+    limit = HUBER * robust_scale(r)
+    magnitude = np.abs(r)
+    w = np.minimum(1.0, limit / np.maximum(magnitude, 1e-12))
+    rho = np.where(w < 1.0, limit * (2.0 * magnitude - limit), r * r)
+    strength = 1.0 / (CORRELATION * (COST_FLOOR + rho.mean()))
+    root = np.sqrt(w)
+    A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
+    prior = np.zeros(len(state.x))
+    prior[: problem.fixed] = 1.0
+    H = strength * (A.T @ A) + np.diag(prior + 1e-9)
+    return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
+
+
+def bounded_newton(H: Array, g: Array, low: Array, high: Array) -> Array:
+    """Minimiser of ``d H d / 2 + g d`` within bounds, by pinning what would leave them (a few rounds suffice)."""
+    move = np.zeros(len(g))
+    free = np.ones(len(g), dtype=bool)
+    for _ in range(8):
+        pinned = ~free
+        rhs = -(g[free] + H[np.ix_(free, pinned)] @ move[pinned])
+        move[free] = np.linalg.solve(H[np.ix_(free, free)], rhs)
+        out = free & ((move < low) | (move > high))
+        if not out.any():
+            break
+        move[out] = np.clip(move[out], low[out], high[out])
+        free &= ~out
+        if not free.any():
+            break
+    return np.clip(move, low, high)

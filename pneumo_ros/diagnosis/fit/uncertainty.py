@@ -1,0 +1,122 @@
+"""Standard deviations of a fit's parameters, and what is wrong with the parameters themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.result import Estimate
+from pneumo_ros.effects.parameters import EffectParameter
+
+LONGEST = 60  # fit samples over which the residual's correlation is summed
+TRUE_TO = 2e-3
+LAW = 0.015  # of an effect's value: another law of the same kind puts its parameter that far off
+NOTHING = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by
+
+
+def covariance(problem: Problem, fit: Fit) -> Array:
+    """Covariance of the scaled unknowns: curvature of the data over the residual's own size and correlation, and prior.
+
+    An unknown at its bound does not vary. Sensitivities are true to :data:`TRUE_TO` of themselves: a direction that
+    moves the outputs by less than that tells nothing, and only the prior holds it.
+    """
+    assert fit.jacobian is not None
+    free = _free(problem, fit)
+    J = fit.jacobian[:, :, free].reshape(-1, int(free.sum()))
+    prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)[free]
+    strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
+    size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
+    values, vectors = np.linalg.eigh((J / size).T @ (J / size))
+    known = (vectors * np.maximum(values - len(size) * TRUE_TO**2, 0.0)) @ vectors.T * np.outer(size, size)
+    out = np.zeros((len(fit.x), len(fit.x)))
+    out[np.ix_(free, free)] = np.linalg.inv(strength * known + np.diag(prior))
+    return out
+
+
+def correlation_time(residual: Array) -> float:
+    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero, worst half of the channels."""
+    times = []
+    for column in (residual - residual.mean(axis=0)).T:
+        power = float(column @ column)
+        if power <= 0.0:
+            continue
+        total = 1.0
+        for lag in range(1, min(LONGEST, len(column) - 1)):
+            rho = float(column[lag:] @ column[:-lag]) / power
+            if rho <= 0.0:
+                break
+            total += 2.0 * rho
+        times.append(total)
+    return float(np.median(times)) if times else 1.0
+
+
+def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """Effect parameters, SI; a name that two effects share is prefixed with the effect's id."""
+    assert fit.jacobian is not None
+    parameters = problem.effect_parameters(fit.candidate)
+    owners = [effect for effect, _ in fit.candidate.parts for _ in problem.model.effects[effect].parameters]
+    names = [p.name for p in parameters]
+    free = _free(problem, fit)
+    out = {}
+    for k, (p, owner) in enumerate(zip(parameters, owners, strict=True)):
+        m = problem.fixed + k
+        value = float(fit.x[m] * p.typical)
+        moved = float(np.sqrt(np.mean(fit.jacobian[:, :, m] ** 2)))
+        name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
+        while name in out:
+            name += "_2"
+        at_bound = not free[m] and not _natural(p, value)
+        out[name] = Estimate(
+            value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
+        )
+    return out | _derived(problem, fit, cov)
+
+
+def _derived(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """What an effect's parameters give together, its variance by linear propagation."""
+    out: dict[str, Estimate] = {}
+    first = problem.fixed
+    for effect, _ in fit.candidate.parts:
+        parameters = problem.model.effects[effect].parameters
+        scale = np.array([p.typical for p in parameters])
+        block = slice(first, first + len(parameters))
+        values, own = fit.x[block] * scale, cov[block, block] * np.outer(scale, scale)
+        first += len(parameters)
+        for one in getattr(problem.model.effects[effect], "derived", ()):
+            value = one.of(tuple(values))
+            steps = 1e-6 * np.maximum(np.abs(values), 1e-6 * scale)
+            slope = np.array([(one.of(tuple(values + s * e)) - value) / s for s, e in zip(steps, np.eye(len(steps)),
+                                                                                        strict=True)])  # fmt: skip
+            name = one.name if one.name not in out else f"{effect}.{one.name}_2"
+            out[name] = Estimate(value, float(np.hypot(np.sqrt(max(slope @ own @ slope, 0.0)), LAW * value)), one.unit)
+    return out
+
+
+def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
+    """Nuisance parameters, SI."""
+    values = problem.nuisance(fit.x)
+    free = _free(problem, fit)
+    return {
+        p.name: Estimate(float(values[m]), float(np.sqrt(cov[m, m]) * p.std), p.unit, not free[m])
+        for m, p in enumerate(problem.model.parameters)
+    }
+
+
+def at_bounds(problem: Problem, fit: Fit) -> int:
+    """How many parameters of its effects ended at an end of their allowed range."""
+    free, parameters = _free(problem, fit), problem.effect_parameters(fit.candidate)
+    values = problem.values(fit.candidate, fit.x)
+    return sum(not free[problem.fixed + k] and not _natural(p, values[k]) for k, p in enumerate(parameters))
+
+
+def _natural(parameter: EffectParameter, value: float) -> bool:
+    """Whether a value is a natural end of its law: a part that is absent, a share that is whole."""
+    return any(abs(value - end) <= 1e-9 * abs(parameter.typical) for end in parameter.ends)
+
+
+def _free(problem: Problem, fit: Fit) -> Mask:
+    low, high = problem.bounds(fit.candidate)
+    width = np.where(np.isfinite(high - low), high - low, 1.0)
+    return np.asarray((fit.x > low + 1e-6 * width) & (fit.x < high - 1e-6 * width))

@@ -1,0 +1,176 @@
+"""The experiment that would split an ambiguity group: profiles ranked by how far they drive the rivals apart.
+
+Each rival keeps what its own fit of the log gave it, so that on the log they agree; on a candidate profile they are
+simulated, the nuisance parameters answer linearly (a difference that a tolerance could explain separates nothing), and
+what remains is compared with the sensors' noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Problem, average
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.result import Experiment
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.plant.trim import Trim, trim
+
+DURATION = 12.0  # s
+PERIOD = 2e-3  # s
+STEP = 0.5  # prior sigmas, for the nuisance parameters' answer
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A road and valve profile with a sentence for the person who runs it."""
+
+    name: str
+    description: str
+    road: Callable[[Array], Array]  # t (N,) -> (N, 2) m
+    valves: Callable[[Array], Array]  # t (N,) -> (N, 2) factor on the trimmed inlets
+
+
+def _flat(t: Array) -> Array:
+    return np.zeros((len(t), 2))
+
+
+def _trimmed(t: Array) -> Array:
+    return np.ones((len(t), 2))
+
+
+def _sweep(amplitude: float, low: float, high: float) -> Callable[[Array], Array]:
+    def road(t: Array) -> Array:
+        rate = float(np.log(high / low)) / DURATION
+        phase: Array = 2.0 * np.pi * low * (np.exp(rate * t) - 1.0) / rate
+        return amplitude * np.column_stack([np.sin(phase), np.sin(phase - 0.7)])
+
+    return road
+
+
+def _bumps(height: float) -> Callable[[Array], Array]:
+    def road(t: Array) -> Array:
+        late = [np.mod(t - shift, 2.0) for shift in (0.5, 1.5)]
+        return np.column_stack([np.where(x < 0.15, height * np.sin(np.pi * x / 0.15) ** 2, 0.0) for x in late])
+
+    return road
+
+
+def _slow(amplitude: float) -> Callable[[Array], Array]:
+    def road(t: Array) -> Array:
+        return amplitude * np.column_stack([np.sin(2 * np.pi * 0.4 * t), np.sin(2 * np.pi * 0.3 * t)])
+
+    return road
+
+
+def _steps(size: float, hold: float) -> Callable[[Array], Array]:
+    def valves(t: Array) -> Array:
+        pattern = np.array([0.0, 1.0, -0.6, 0.5, -1.0, 0.8, -0.3, 0.0])
+        rows = (t / hold).astype(int)
+        return 1.0 + size * np.column_stack([pattern[rows % 8], pattern[(rows + 3) % 8]])
+
+    return valves
+
+
+PROFILES = (
+    Profile(
+        "sweep-small",
+        "sine sweep 0.5 to 20 Hz, 1 mm: friction sticks, viscous damping does not",
+        _sweep(1e-3, 0.5, 20.0),
+        _trimmed,
+    ),
+    Profile(
+        "sweep-large",
+        "sine sweep 0.5 to 12 Hz, 5 mm: forces that grow with speed or travel",
+        _sweep(5e-3, 0.5, 12.0),
+        _trimmed,
+    ),
+    Profile("bumps", "single bumps of 12 mm: stops, lift-off, and the free decay after them", _bumps(0.012), _trimmed),
+    Profile(
+        "slow-heave",
+        "slow heave of 6 mm: hysteresis, heat exchange and offsets without inertia",
+        _slow(6e-3),
+        _trimmed,
+    ),
+    Profile(
+        "valve-steps-large",
+        "inlet steps of 30 % held 1 s on a flat road: leaks, supply, coefficients",
+        _flat,
+        _steps(0.3, 1.0),
+    ),
+    Profile(
+        "valve-steps-fast",
+        "inlet steps of 25 % every 0.12 s on a flat road: lag against delay",
+        _flat,
+        _steps(0.25, 0.12),
+    ),
+    Profile(
+        "valve-steps-small",
+        "inlet steps of 4 % held 0.5 s on a flat road: deadband and sticking",
+        _flat,
+        _steps(0.04, 0.5),
+    ),
+)
+
+
+def design_experiment(problem: Problem, best: Fit, rival: Fit) -> Experiment | None:
+    """The profile of :data:`PROFILES` that separates two fitted structures most; None for another kind of model."""
+    model = problem.model
+    if not isinstance(model, RigModel):
+        return None
+    at_rest = trim(model.rig)
+    now = _separation(problem, best, rival, problem.records[-1])
+    found = []
+    for profile in PROFILES:
+        record = _record(model, profile, at_rest, problem.records[-1])
+        found.append((_separation(problem, best, rival, record), profile, record))
+    separation, profile, record = max(found, key=lambda item: item[0])
+    time = np.arange(len(record.measured)) * record.period
+    return Experiment(
+        profile.name, profile.description, separation, now, time, np.asarray(record.road), np.asarray(record.commands)
+    )
+
+
+def _record(model: RigModel, profile: Profile, at_rest: Trim, like: Any) -> Any:
+    """A log-shaped record of the profile from rest."""
+    t = np.arange(round(DURATION / PERIOD), dtype=np.float64) * PERIOD
+    commands = np.tile(at_rest.command, (len(t), 1))
+    commands[:, :2] = np.clip(commands[:, :2] * profile.valves(t), 0.0, model.rig.inlet_area_max.value)
+    road = profile.road(t) * np.minimum(1.0, t / 0.2)[:, None]
+    rows = np.tile(model.simulate(like, rows=2)[:1], (len(t), 1))
+    return replace(like, period=PERIOD, measured=rows, weight=np.ones_like(rows), commands=commands, road=road,
+                   start_state=replace_state(like, at_rest.state))  # fmt: skip
+
+
+def replace_state(like: Any, state: Array) -> Any:
+    """The record's initial estimate, put at rest."""
+    return like.start_state._replace(state=np.asarray(state))
+
+
+def _separation(problem: Problem, best: Fit, rival: Fit, record: Any) -> float:
+    """Root mean square of the rivals' difference over the noise, free of what nuisance parameters could answer."""
+    model = problem.model
+    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
+    other = problem.active(rival.candidate, problem.values(rival.candidate, rival.x))
+    nuisance = problem.nuisance(best.x)
+
+    def outputs(values: Array, effects: Any) -> Array:
+        initial = model.initial(record, effects)[0]
+        return np.asarray(average(model.predict(record, values, initial, effects), problem.averaged) / record.noise)
+
+    base = outputs(nuisance, active)
+    difference = (outputs(problem.nuisance(rival.x), other) - base).ravel()
+    columns = []
+    for m, p in enumerate(model.parameters):
+        moved = nuisance.copy()
+        moved[m] += STEP * p.std
+        columns.append((outputs(moved, active) - base).ravel() / STEP)
+    J = np.array(columns).T
+    if not (np.all(np.isfinite(J)) and np.all(np.isfinite(difference))):
+        return 0.0
+    answer = np.linalg.solve(J.T @ J + np.eye(J.shape[1]), J.T @ difference)
+    return float(np.sqrt(np.mean((difference - J @ answer) ** 2)))

@@ -1,0 +1,175 @@
+"""A diagnosis from log files: reads them, builds the model with the wanted library, and runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
+from pneumo_ros.diagnosis.judge.outcome import Whereabouts
+from pneumo_ros.diagnosis.result import Diagnosis
+from pneumo_ros.diagnosis.search.competition import Progress
+from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
+from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
+from pneumo_ros.effects import library as own_effects
+from pneumo_ros.effects.configured import library_of
+from pneumo_ros.effects.contract import Effect
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.errors import InputError
+from pneumo_ros.rig import Rig
+
+
+@dataclass(frozen=True)
+class Task:
+    """Logs that were read and the model that fits them."""
+
+    model: RigModel
+    fit: tuple[Signals, ...]
+    holdout: Signals
+    edit: Signals | None = None
+    notes: tuple[str, ...] = ()
+
+    def diagnose(self, options: Options | None = None, progress: Progress | None = None) -> Diagnosis:
+        """Run the diagnosis, with the places of what is left found by flexible corrections."""
+        chosen = options or Options()
+        if chosen.locate is None:
+            chosen = replace(chosen, locate=FlexibleSearch())
+        found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
+        return replace(found, notes=(*self.notes, *found.notes))
+
+
+def prepared(
+    fit: Sequence[str | Path],
+    holdout: str | Path | None = None,
+    rig: Rig | None = None,
+    edit: str | Path | None = None,
+    effects: Sequence[str | Path] = (),
+    without: Sequence[str] = (),
+) -> Task:
+    """Read the logs and build the model.
+
+    Parameters
+    ----------
+    fit : logs to fit, at least one
+    holdout : log nothing is fitted to; None: the end of the last fit log
+    rig : in place of the one the logs carry
+    edit : log of the rig after a known change (its own configuration states the change)
+    effects : Python files with further effects
+    without : ids of effects that must not compete
+
+    Raises
+    ------
+    InputError
+        for logs, rigs or effects that cannot be used, and for inputs that throw the nominal model off.
+    """
+    if not fit:
+        raise InputError("no log to fit", remedy="give at least one log")
+    first = read_signals(fit[0], rig)
+    library = library_of(first.rig, effects)
+    for name in without:
+        if name not in library:
+            raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
+    logs = [first, *(read_signals(path, rig) for path in fit[1:])]
+    model = RigModel(first.rig, library, frozenset(without))
+    notes = [*_outside(library), *_standing_notes(model)]
+    if holdout is None:
+        check_pair(logs, None)
+        logs, held = split_by_time(logs)
+        notes.append("no held-out log was given: the end of the last fit log is held out, which tests less")
+    else:
+        held = read_signals(holdout, rig)
+        check_pair(logs, held)
+    _check_runs(model, [*logs, held])
+    changed = None if edit is None else read_signals(edit)
+    if changed is not None:
+        notes += _about_edit(model, changed)
+    return Task(model, tuple(logs), held, changed, tuple(notes))
+
+
+def _outside(library: Mapping[str, Effect]) -> list[str]:
+    """Which effects of the library are not the package's own: a reader must know who competed."""
+    folder = Path(str(own_effects.__file__)).parent
+    names = [name for name in library if not (folder / f"{name}.py").exists()]
+    return [f"effects of your own that competed: {', '.join(names)}"] if names else []
+
+
+def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:
+    """Refuse inputs that throw the nominal model off the road: no fit starts from there."""
+    for log in logs:
+        if not np.all(np.isfinite(model.simulate(log))):
+            raise InputError(
+                "the nominal model runs away with this log's road and commands", where=log.name,
+                value=f"road up to {np.max(np.abs(log.road)):.3g} m, openings up to {np.max(log.commands):.3g} m2",
+                remedy="check the units of /road/profile and /valve/command, and the rig",
+            )  # fmt: skip
+
+
+def _about_edit(model: RigModel, edit: Signals) -> list[str]:
+    """What limits the edit test: the log itself, or a configuration that states no change."""
+    notes = [f"{edit.name}: {one.text}" for one in edit.limitations]
+    if all(factor == 1.0 for factor in model.changes(edit).values()):
+        notes.append(
+            f"{edit.name}: its configuration states no change of the rig, so the edit test is one more held-out log"
+        )
+    return notes
+
+
+def _standing_notes(model: RigModel) -> tuple[str, ...]:
+    """What the rig's configuration brings into the model beyond the nominal equations.
+
+    Raises
+    ------
+    InputError
+        if it names an effect that cannot be.
+    """
+    if not model.standing:
+        return ()
+    names = ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in model.standing)
+    return (
+        f"the rig's configuration names {names}: part of the model as stated there, of 'nominal' and 'refit' too; what "
+        "competes is what the logs show beyond it",
+    )
+
+
+def diagnose_files(
+    fit: Sequence[str | Path],
+    holdout: str | Path | None = None,
+    rig: Rig | None = None,
+    edit: str | Path | None = None,
+    effects: Sequence[str | Path] = (),
+    without: Sequence[str] = (),
+    options: Options | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose logs; parameters as in :func:`prepared`."""
+    return prepared(fit, holdout, rig, edit, effects, without).diagnose(options, progress)
+
+
+class FlexibleSearch:
+    """Places of what a structure leaves, by flexible corrections of its equations in weak form.
+
+    Keeps the search from the nominal model, which later structures are measured against.
+    """
+
+    def __init__(self) -> None:
+        self.first: Location | None = None
+
+    def __call__(
+        self,
+        model: RigModel,
+        fit: Sequence[Signals],
+        holdout: Signals,
+        nuisance: Array | None,
+        active: Sequence[Active],
+    ) -> Whereabouts:
+        if nuisance is None:
+            self.first = found = locate(model, fit, holdout)
+            return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
+        gain = flexible_gain(model, fit, holdout, nuisance, active, self.first)
+        flat = not gain.places
+        return Whereabouts((), float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)

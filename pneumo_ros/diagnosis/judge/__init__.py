@@ -1,0 +1,1 @@
+"""From what was fitted to a verdict: held-out runs, probabilities, ambiguity, ranking."""

@@ -1,0 +1,76 @@
+"""What the competition and the held-out log gave: all that verdict, ranking and report are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
+from pneumo_ros.diagnosis.search.competition import Contest
+from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.effects.parameters import Active
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """What flexible corrections on top of a structure say about the places of what it leaves.
+
+    Attributes
+    ----------
+    shares : (place, share of the held-out residual), largest first
+    left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
+    mendable : the same once the right places get a flexible correction
+    flat : noise, tolerances and model form explain what is left
+    kept : share of the equations' gap that this structure leaves; None for the nominal one, which leaves all of it
+    """
+
+    shares: tuple[tuple[str, float], ...]
+    left: float
+    mendable: float
+    flat: bool
+    kept: float | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Structures with their scores, and the held-out log under the nominal, the re-estimated and the best of them.
+
+    Attributes
+    ----------
+    contest : the competition, ended
+    refit, finalists, chosen : scored on the selection blocks
+    base, best : the refit and the chosen structure, fitted to all blocks; the same object where nothing was chosen
+    holdout : the held-out record
+    runs : "nominal", "refit" and "best" on it
+    before, after : places of what the nominal and the best structure leave; None where nobody looked
+    """
+
+    contest: Contest
+    refit: Scored
+    finalists: tuple[Scored, ...]
+    chosen: Scored
+    base: Fit
+    best: Fit
+    holdout: Any
+    runs: Mapping[str, HeldOut]
+    before: Whereabouts | None
+    after: Whereabouts | None
+
+    @property
+    def problem(self) -> Problem:
+        """The fitted logs, as last timed."""
+        return self.contest.problem
+
+    @property
+    def nuisance(self) -> Array:
+        """Tolerance parameters of the best structure, SI."""
+        return self.problem.nuisance(self.best.x)
+
+    @property
+    def active(self) -> tuple[Active, ...]:
+        """Effects of the best structure."""
+        return self.problem.active(self.best.candidate, self.problem.values(self.best.candidate, self.best.x))

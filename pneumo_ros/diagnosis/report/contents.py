@@ -1,0 +1,273 @@
+"""What the report says, in the order a reader needs it; the template only lays it out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
+from pneumo_ros.diagnosis.report.rig_map import draw_map
+from pneumo_ros.diagnosis.report.words import (
+    LIKELY,
+    confidence,
+    headline,
+    how_far,
+    next_steps,
+    percent,
+    place_words,
+    sentence,
+    winner,
+)
+from pneumo_ros.diagnosis.signals import MEASURED, Signals
+from pneumo_ros.diagnosis.where import Law
+
+ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
+SHOWN_CHANNELS = 2  # the rest is folded away
+TITLES = {
+    "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
+    "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
+}  # fmt: skip
+UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything the report is made from.
+
+    Attributes
+    ----------
+    summary : the diagnosis file's mapping (contract), with whatever further keys it has
+    trajectories : "nominal", "refit" and "best" -> (N, 6) free runs on the held-out log
+    holdout : the held-out log
+    fit_names : names of the logs fitted
+    phrases : effect id -> what it is, in words
+    regimes : sentences on when the gap shows
+    conditional : subsystem -> gap when it is run alone
+    laws : what is missing at the places, as curves
+    mended : held-out gap with flexible corrections at the places found, no law named; None to leave it out
+    """
+
+    summary: Mapping[str, Any]
+    trajectories: Mapping[str, Array]
+    holdout: Signals
+    fit_names: Sequence[str]
+    phrases: Mapping[str, str] = field(default_factory=dict)
+    regimes: Sequence[str] = ()
+    conditional: Mapping[str, float] = field(default_factory=dict)
+    laws: Sequence[Law] = ()
+    mended: float | None = None
+
+
+def contents(found: Findings) -> dict[str, Any]:
+    """Variables of the template."""
+    summary = found.summary
+    told = summary["verdict"] != "not_testable"  # without a verdict no place, candidate or size may look like one
+    shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", []) if told}
+    charts = _charts(found)
+    return {
+        "title": f"Gap of {found.holdout.rig.name}",
+        "verdict": summary["verdict"],
+        "headline": headline(summary, found.phrases),
+        "confidence": confidence(summary),
+        "tone": _tone(summary),
+        "how_far": how_far(summary),
+        "next_steps": next_steps(summary, found.fit_names),
+        "map": draw_map(shares),
+        "places": [
+            {"name": place, "words": place_words(place), "share": share}
+            for place, share in shares.items()
+            if share >= 0.01
+        ],
+        "laws": [_law(law) for law in found.laws],
+        "ladder": ladder(_rungs(summary["gap"], found.mended)),
+        "charts": charts[:SHOWN_CHANNELS],
+        "more_charts": charts[SHOWN_CHANNELS:],
+        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10] if told],
+        "parameters": _parameters(summary) if told else [],
+        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items() if told],
+        "ambiguity": _ambiguity(summary, found.phrases) if told else [],
+        "rivals_are": _RIVALS.get(str(summary["verdict"]), "These fit it almost as well as the verdict:"),
+        "experiment": summary.get("next_experiment"),
+        "edit": _edit(summary),
+        "refused": _refused(summary),
+        "notes": [sentence(note) for note in summary.get("notes", [])],
+        "regimes": [sentence(text) for text in found.regimes],
+        "conditional": [{"name": name.replace("_", " "), "gap": gap} for name, gap in found.conditional.items()],
+        "topics": found.holdout.topics,
+        "fit_names": list(found.fit_names),
+        "holdout_name": found.holdout.name,
+        "rig": found.holdout.rig.name,
+        "seconds": len(found.holdout.measured) * found.holdout.period,
+    }
+
+
+def _tone(summary: Mapping[str, Any]) -> str:
+    if summary["verdict"] in ("unknown", "not_testable") or float(summary["probability"]) < LIKELY:
+        return "open"
+    return "fine" if summary["verdict"] == "none" else "found"
+
+
+def _rungs(gap: Mapping[str, Any], mended: float | None) -> list[tuple[str, float, str]]:
+    rungs = [
+        ("nominal model", float(gap["nominal"]), "nominal"),
+        ("parameters re-estimated", float(gap["refit"]), "refit"),
+        ("with the best explanation", float(gap["best"]), "best"),
+        ("sensor noise alone", float(gap["noise_floor"]), "floor"),
+    ]
+    if mended is not None:
+        rungs.insert(3, ("that place mended freely", mended, "mended"))
+    return rungs
+
+
+def _charts(found: Findings) -> list[dict[str, str]]:
+    """Overlay and residual of every usable channel, the one with the largest refitted gap first."""
+    log, runs = found.holdout, found.trajectories
+    errors = np.sqrt(np.mean(((log.measured - runs["refit"]) * log.weight / log.scale) ** 2, axis=0))
+    order = [int(c) for c in np.argsort(-errors) if log.usable[c]]
+    first, last = _zoom(log, runs["refit"])
+    return [_chart(found, c, first, last) for c in order]
+
+
+def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
+    log, name = found.holdout, MEASURED[c]
+    unit, factor = UNITS[name]
+    measured = np.where(log.weight[:, c] > 0, log.measured[:, c], np.nan) * factor
+    lines = [Line("log", "log", measured[first:last])]
+    lines += [Line(key, key, run[first:last, c] * factor) for key, run in found.trajectories.items() if key in _DRAWN]
+    left = [Line(key, key, measured - found.trajectories[key][:, c] * factor) for key in ("refit", "best")]
+    gaps = found.summary["gap"].get("per_channel", {}).get(name, {})
+    return {
+        "title": TITLES[name],
+        "name": name,
+        "overlay": plot(log.time[first:last], lines, unit),
+        "residual": plot(log.time, left, unit, height=120, band=2.0 * float(log.noise[c]) * factor),
+        "gaps": " → ".join(f"{gaps[key]:.3g}" for key in ("nominal", "refit", "best") if key in gaps)
+        if isinstance(gaps, Mapping)
+        else "",
+    }
+
+
+_DRAWN = ("nominal", "refit", "best")
+
+
+def _zoom(log: Signals, refit: Array) -> tuple[int, int]:
+    count = len(log.measured)
+    rows = min(count, round(ZOOM / log.period))
+    error = np.mean(((log.measured - refit) * log.weight / log.scale) ** 2, axis=1)
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    first = int(np.argmax(total[rows:] - total[:-rows])) if count > rows else 0
+    return first, first + rows
+
+
+def _sides(entry: Mapping[str, Any]) -> str:
+    sites = [site.replace("_", " ") for site in entry.get("sites", []) if site]
+    return ", ".join(dict.fromkeys(sites)) or str(entry.get("side") or "")
+
+
+def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str, Any]:
+    low, high = entry["shrink_ci90"]
+    return {
+        "name": " + ".join(entry["effects"]),
+        "side": _sides(entry),
+        "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
+        "probability": float(entry["probability"]),
+        "gap": float(entry["gap_after"]),
+        "shrink": percent(entry["shrink"]),
+        "bar": shrink_bar(entry["shrink"], (low, high)),
+    }
+
+
+def _law(law: Law) -> dict[str, str]:
+    (x_unit, x_factor), (y_unit, y_factor) = readable(law.quantity_unit, law.x), readable(law.unit, law.y)
+    what = {"N": "missing force", "N m": "missing moment", "kg/s": "missing inflow"}[law.unit]
+    curve = (law.centres * x_factor, law.means * y_factor)
+    labels = (f"{law.quantity}, {x_unit}", f"{what}, {y_unit}")
+    return {
+        "plot": scatter(law.x * x_factor, law.y * y_factor, curve, labels),
+        "text": f"What the re-estimated model misses at {place_words(law.place)}, seen in the balance of the "
+        f"{law.equation.replace('_', ' ')}. Of all quantities, {law.quantity} explains most of it: "
+        f"{100 * law.explained:.0f} %.",
+    }
+
+
+def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    if not summary.get("ranking"):
+        return []
+    return [_quantity(name, value) for name, value in winner(summary)["parameters"].items()]
+
+
+def _quantity(name: str, quantity: Mapping[str, Any]) -> dict[str, str]:
+    value, std = float(quantity["value"]), float(quantity.get("std") or 0.0)
+    unit, factor = readable(str(quantity.get("unit") or "1"), np.array([value]))
+    shown = "" if unit == "1" else unit
+    return {"name": name.replace("_", " "), "value": rounded(value * factor, std * factor), "unit": shown}
+
+
+_READABLE = {
+    "m": (("mm", 1e3, 0.5), ("µm", 1e6, 5e-4)), "m2": (("mm²", 1e6, 1e-2),), "m3": (("cm³", 1e6, 1e-2),),
+    "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 5e-3)),
+}  # fmt: skip
+
+
+def readable(unit: str, values: Array) -> tuple[str, float]:
+    """Unit and factor that make values of an SI unit easy to read: mm for millimetres, kPa for pressures."""
+    size = float(np.max(np.abs(values))) if len(values) else 0.0
+    found = (unit, 1.0)
+    for name, factor, below in _READABLE.get(unit, ()):
+        if 0.0 < size < below:
+            found = (name, factor)
+    return found
+
+
+def rounded(value: float, std: float) -> str:
+    """Value and standard deviation, the latter with two digits; four digits of the value without one."""
+    if not np.isfinite(std) or std <= 0.0:
+        return f"{value:.4g}"
+    digits = int(np.floor(np.log10(std))) - 1
+    if digits >= -6 and abs(value) < 1e6:
+        places = max(-digits, 0)
+        return f"{value:.{places}f} ± {std:.{places}f}"
+    power = int(np.floor(np.log10(max(abs(value), std))))
+    places = max(power - digits, 0)
+    return f"({value / 10.0**power:.{places}f} ± {std / 10.0**power:.{places}f})·10^{power}"
+
+
+_RIVALS = {
+    "none": "These are not excluded; what they would explain here is too little to accept one:",
+    "unknown": "These come closest, and one may be it by another law than the library's:",
+}
+
+
+def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[str]:
+    """Rivals of the verdict, itself left out; a pair ("a+b") in the words of its parts."""
+    rivals = [name for name in summary.get("ambiguity_group", []) if name != summary["verdict"]]
+    words = [" and ".join(phrases.get(part, "") for part in name.split("+")) for name in rivals]
+    return [f"{name}: {said}" if said else name for name, said in zip(rivals, words, strict=True)]
+
+
+def _edit(summary: Mapping[str, Any]) -> str:
+    test = summary.get("edit_test")
+    if not test:
+        return ""
+    changes = ", ".join(
+        f"{name.replace('_', ' ')} {100 * (factor - 1):+.1f} %" for name, factor in test["changes"].items()
+    )
+    return (
+        f"Predicted without refitting on {test['log']} ({changes or 'nothing changed'}): gap {test['gap_nominal']:.3g} "
+        f"nominal, {test['gap_refit']:.3g} re-estimated, {test['gap_best']:.3g} with the best explanation."
+    )
+
+
+def _refused(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Explanations that something counts against, and those that this log could not have shown."""
+    out = [
+        {"name": " + ".join(entry["effects"]), "side": entry.get("side") or "", "why": "; ".join(entry["notes"])}
+        for entry in summary.get("ranking", [])
+        if entry.get("notes")
+    ]
+    hidden: Mapping[str, str] = summary.get("not_testable") or {}
+    return out + [{"name": name, "side": "", "why": f"not testable here: {why}"} for name, why in hidden.items()]

@@ -1,0 +1,1 @@
+"""Which structures are worth a fit, which are fitted, and which the kept blocks prefer."""

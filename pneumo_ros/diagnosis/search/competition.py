@@ -1,0 +1,350 @@
+"""The competition: nominal re-estimated, single effects, pairs; each fitted with every nuisance parameter free.
+
+Cheap screening first (:mod:`pneumo_ros.diagnosis.search.screening`), short fits of what promises most, then the best to
+convergence, from several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on top of each
+leading single, where the first effect no longer hides it. Whenever the best fit so far is good enough to time the
+command's jumps by (:mod:`pneumo_ros.diagnosis.fit.command_events`), they are timed and the finalists fitted again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.command_events import timed
+from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.search.screening import Promise, all_parts, compatible, promises, trials, visibility
+from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level, score
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.errors import InputError
+
+PROBE = 3  # steps of a probe
+LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
+NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
+STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
+Progress = Callable[[float, str], None]  # share done 0..1, what is being done
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is fitted; more of each finds rarer combinations and costs time in proportion.
+
+    Attributes
+    ----------
+    singles : singles that get a short fit
+    finalists : singles fitted to convergence
+    seconds : second effects tried on the first, second, ... leader
+    blind_pairs : pairs taken from the screening at the refit
+    pair_finalists : pairs fitted to convergence
+    probes : second effects probed on each leader
+    exchanged : rivals probed in place of each effect of the best pair
+    short, anew, long : iterations of a short fit, of one from another shape, of a full one
+    """
+
+    singles: int = 10
+    finalists: int = 5
+    seconds: tuple[int, ...] = (6, 4, 2)
+    blind_pairs: int = 3
+    pair_finalists: int = 3
+    probes: int = 24
+    exchanged: int = 6
+    short: int = 3
+    anew: int = 5
+    long: int = 8
+
+
+@dataclass
+class Contest:
+    """The state of a competition; ends as its result.
+
+    Attributes
+    ----------
+    logged : the problem with the command's jumps where the logs have them
+    problem : the same as last timed
+    refit : the nominal structure re-estimated
+    singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
+    promised : screening of the singles at the refit, for the report
+    lost : labels of candidates whose fit diverged
+    visible : effect id -> rms in sigmas that its typical size would move the outputs by
+    """
+
+    logged: Problem
+    problem: Problem
+    refit: Fit
+    effort: Effort
+    progress: Progress
+    singles: list[Fit] = field(default_factory=list)
+    pairs: list[Fit] = field(default_factory=list)
+    promised: list[Promise] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    visible: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def finalists(self) -> list[Fit]:
+        """Converged singles and pairs."""
+        return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
+
+    @property
+    def best(self) -> Fit:
+        """Lowest training cost of all."""
+        return min([self.refit, *self.finalists], key=lambda f: f.cost)
+
+
+def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Contest:
+    """Run the competition; ``progress`` is called with the share done."""
+    progress(0.0, "re-estimating the nominal model")
+    nominal = Candidate()
+    refit = _rescued(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), 15)
+    if refit.diverged:
+        raise InputError("the nominal model runs away on these logs, whatever its tolerances",
+                         where=", ".join(r.name for r in problem.records),
+                         remedy="check rig values, units and signs of command and road")  # fmt: skip
+    problem, refit = _in_turn(problem, refit)
+    contest = Contest(problem, problem, refit, effort, progress)
+    _time_jumps(contest)
+    _run_singles(contest)
+    _time_jumps(contest)
+    if pairs and contest.singles and _room_for_more(contest):
+        _run_pairs(contest)
+        _time_jumps(contest)
+    return contest
+
+
+def _in_turn(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
+    """The problem with those blocks kept from the fit that hold about their share of what the nominal model leaves.
+
+    A stop that is hit once, or a wheel that leaves the ground once, may lie in the kept blocks alone, where nothing can
+    be fitted to it.
+    """
+    squares = np.where(problem.weight > 0.0, refit.residual**2, 0.0).sum(axis=1)
+    whole = max(float(squares.sum()), 1e-12)
+    shares = [squares[problem.block % SELECT_EVERY == turn].sum() / whole for turn in range(SELECT_EVERY)]
+    if LOPSIDED[0] <= shares[problem.turn] <= LOPSIDED[1]:
+        return problem, refit
+    turn = int(np.argmin(np.abs(np.array(shares) - 1.0 / SELECT_EVERY)))
+    if turn == problem.turn:
+        return problem, refit
+    problem = replace(problem, turn=turn)
+    return problem, fit(problem, refit.candidate, refit.x, refit.jacobian, iterations=15)
+
+
+def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
+    """The fit, or, where its free run went astray, the better one that starts from short windows."""
+    if not astray(problem, state):
+        return state
+    other = fit_from_windows(problem, state.candidate, state.x, iterations)
+    return state if other is None or not other.cost < state.cost else other
+
+
+def _room_for_more(contest: Contest) -> bool:
+    """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
+    blocks is so near the sensors' noise that even all of the rest would not be enough.
+    """
+    problem = contest.problem
+    least = min(score(problem, one).level for one in (contest.refit, *contest.finalists))
+    return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
+
+
+def _time_jumps(contest: Contest) -> None:
+    """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
+    moved = timed(contest.logged, contest.problem, contest.best)
+    if moved is contest.problem:
+        return
+    contest.problem = moved
+    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.finalists]
+    contest.refit = fit(moved, Candidate(), contest.refit.x, contest.refit.jacobian)
+    singles, pairs = contest.effort.finalists, contest.effort.pair_finalists
+    done = len(contest.singles[:singles])
+    contest.singles = _by_cost(again[:done]) + contest.singles[singles:]
+    contest.pairs = _by_cost(again[done:]) + contest.pairs[pairs:]
+
+
+def _run_singles(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.05, "screening effects")
+    found = trials(problem, contest.refit, all_parts(problem))
+    contest.promised = promises(problem, contest.refit, found)
+    contest.visible = visibility(problem, contest.refit, found)
+    chosen = _varied(_probed(problem, contest.refit, contest.promised), effort.singles, 3)
+    short = _short_fits(contest, contest.refit, chosen, (0.1, 0.4))
+    ended = [
+        _finish(problem, one, effort, contest.refit if k < STARTED_TWICE else None)
+        for k, one in enumerate(short[: effort.finalists])
+    ]
+    contest.singles = _by_cost(ended) + short[effort.finalists :]
+
+
+def _run_pairs(contest: Contest) -> None:
+    effort, problem = contest.effort, contest.problem
+    contest.progress(0.6, "screening pairs")
+    seen: set[frozenset[Part]] = set()
+
+    def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
+        fresh = _varied([p for p in promised if frozenset((*base, *p.parts)) not in seen], count, 2)
+        seen.update(frozenset((*base, *p.parts)) for p in fresh)
+        return fresh
+
+    short: list[Fit] = []
+    for k, (single, count) in enumerate(zip(contest.singles, effort.seconds, strict=False)):
+        leader = with_jacobian(problem, single)
+        part = leader.candidate.parts[0]
+        others = [p for p in all_parts(problem) if compatible((part, p))]
+        promised = promises(problem, leader, trials(problem, leader, others))
+        promised = _probed(problem, leader, _varied(promised, effort.probes, 3))
+        span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
+        short += _short_fits(contest, leader, unseen(promised, (part,), count), span)
+    found = trials(problem, contest.refit, all_parts(problem))
+    blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
+    short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
+    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
+    contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+    _exchange_each(contest)
+    _try_without_each(contest)
+
+
+def _exchange_each(contest: Contest) -> None:
+    """For each effect of the best pair, the likeliest other one of the same place: a lag has a delay as its rival, and
+    neither may win because the other was never tried beside the same second effect.
+    """
+    problem, effort = contest.problem, contest.effort
+    if not contest.pairs:
+        return
+    pair = contest.pairs[0]
+    for k, part in enumerate(pair.candidate.parts):
+        kept = pair.candidate.parts[1 - k]
+        alone = fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1)
+        if alone.jacobian is None:  # it diverges without the other effect
+            continue
+        rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible((kept, p))]
+        tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
+        promised = promises(problem, alone, trials(problem, alone, rivals))
+        fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
+        for short in _short_fits(contest, alone, _probed(problem, alone, fresh)[:1], (0.86, 0.88)):
+            contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
+
+
+def _rivals(problem: Problem, part: Part, other: Part) -> bool:
+    """Whether two effects at the same site are blamed on the same place."""
+    if part[0] == other[0] or part[1] != other[1]:
+        return False
+    one, two = (problem.model.places(problem.active(Candidate((p,)), _typical(problem, p))[0]) for p in (part, other))
+    return one[:1] == two[:1]
+
+
+def _typical(problem: Problem, part: Part) -> Array:
+    return np.array([p.typical for p in problem.effect_parameters(Candidate((part,)))])
+
+
+def _alone(problem: Problem, pair: Fit, part: Part) -> tuple[Candidate, Array]:
+    """One effect of a pair, and the unknowns it has there."""
+    candidate, first = Candidate((part,)), 0
+    for one in pair.candidate.parts:
+        count = len(problem.effect_parameters(Candidate((one,))))
+        if one == part:
+            values = problem.values(pair.candidate, pair.x)[first : first + count].tolist()
+            return candidate, problem.start(candidate, pair.x[: problem.fixed], values)
+        first += count
+    raise AssertionError(f"{part} is no part of {pair.candidate.label}")
+
+
+def _try_without_each(contest: Contest) -> None:
+    """Each effect of the best pair alone, from the pair's values: a start that no screening of singles has seen."""
+    problem, pair = contest.problem, contest.pairs[0] if contest.pairs else None
+    if pair is None:
+        return
+    for part in pair.candidate.parts:
+        candidate, start = _alone(problem, pair, part)
+        start[: problem.fixed] = contest.refit.x[: problem.fixed]
+        alone = fit(problem, candidate, start, contest.refit.jacobian, iterations=contest.effort.long)
+        before = min((f.cost for f in contest.finalists if f.candidate == candidate), default=np.inf)
+        if alone.cost < before - 1.0:
+            rest = [f for f in contest.singles if f.candidate != candidate]
+            contest.singles = _by_cost([alone, *rest[: contest.effort.finalists]]) + rest[contest.effort.finalists :]
+
+
+def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
+    """The most promising, but not more than a few sites of one effect, so that rivals of another kind get their
+    chance.
+    """
+    taken: list[Promise] = []
+    for promise in promised:
+        kind = [effect for effect, _ in promise.parts]
+        if sum([effect for effect, _ in p.parts] == kind for p in taken) < sites:
+            taken.append(promise)
+        if len(taken) == count:
+            break
+    return taken
+
+
+def _probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Promise]:
+    """The promises in the order of what a few cheap steps make of them, with the values those end at: the screening is
+    linear, and a typical size may be far from the true one.
+    """
+    own = problem.values(base.candidate, base.x)
+    ranked = []
+    for promise in promised:
+        candidate = Candidate((*base.candidate.parts, *promise.parts))
+        start = problem.start(candidate, base.x[: problem.fixed], [*own, *promise.values])
+        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True)
+        values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
+        ranked.append((one.cost, promise if one.diverged else replace(promise, values=values)))
+    return [promise for _, promise in sorted(ranked, key=lambda item: item[0])]
+
+
+def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
+    problem, out = contest.problem, []
+    for k, promise in enumerate(chosen):
+        candidate = Candidate((*base.candidate.parts, *promise.parts))
+        contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
+        values = [*problem.values(base.candidate, base.x), *promise.values]
+        start = problem.start(candidate, base.x[: problem.fixed], values)
+        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        one = _rescued(problem, one, contest.effort.short)
+        if one.diverged:
+            contest.lost.append(candidate.label)
+        else:
+            out.append(one)
+    return _by_cost(out)
+
+
+def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = None) -> Fit:
+    """To convergence, from where the short fit ended; with a fit to start ``anew`` from, also from its effect's other
+    shapes and signs there; the best.
+    """
+    best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
+    parameters = problem.effect_parameters(short.candidate)
+    if anew is None or all(p.size for p in parameters):
+        return best
+    for values in starts_elsewhere(parameters, problem.values(best.candidate, best.x)):
+        # Not from where this fit ended: its tolerance parameters have bent to the shape it has.
+        start = problem.start(short.candidate, anew.x[: problem.fixed], values)
+        other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
+        if other.cost < best.cost - 1.0:
+            best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
+    return best
+
+
+def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
+    """Starts away from where a fit ended: each shape at its further starts, and each size with the other sign."""
+    out = []
+    for k, p in enumerate(parameters):
+        if not p.size:
+            out += [[value if m == k else float(v) for m, v in enumerate(found)] for value in p.starts]
+            continue
+        other = [value for value in (p.typical, *p.starts) if value * found[k] < 0.0][:1]
+        out += [[value if m == k else q.typical for m, q in enumerate(parameters)] for value in other]
+    return out
+
+
+def with_jacobian(problem: Problem, state: Fit) -> Fit:
+    """The fit with its sensitivities."""
+    return state if state.jacobian is not None else fit(problem, state.candidate, state.x, iterations=1)
+
+
+def _by_cost(fits: Iterable[Fit]) -> list[Fit]:
+    return sorted(fits, key=lambda f: f.cost)

@@ -1,0 +1,202 @@
+"""Which candidates are worth a fit: the gain each promises once the nuisance parameters have answered it.
+
+A trial prediction with the effect at a start value moves the outputs by some trajectory (not only infinitesimally: a
+deadband or a stop does nothing when small). Projected onto what nuisance parameters and initial state cannot do, and
+compared with the residual, it tells the share of the misfit it could explain. Pairs need no further simulation: the
+Gram matrix of the projected trajectories holds them, so that two effects that only work together are found as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.solver import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
+from pneumo_ros.effects.parameters import EffectParameter
+
+SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A candidate extension with the share of the misfit (mean square) that it may explain.
+
+    Attributes
+    ----------
+    parts : the effects added
+    values : their parameter values, SI, scaled by the linear estimate of the size
+    share : 0..1
+    """
+
+    parts: tuple[Part, ...]
+    values: tuple[float, ...]
+    share: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An effect at a site with start values and the change of the residual it makes, (n, C)."""
+
+    part: Part
+    values: tuple[float, ...]
+    change: Array
+
+
+def start_values(parameters: Sequence[EffectParameter]) -> list[tuple[float, ...]]:
+    """Values worth trying: sizes typical, small and at their further starts; one shape parameter at a time
+    elsewhere.
+    """
+    typical = [p.typical for p in parameters]
+    tries = [tuple(typical)]
+    tries.append(tuple(p.typical * SMALL if p.size else p.typical for p in parameters))
+    for k, p in enumerate(parameters):
+        for value in p.starts:
+            tries.append(tuple(value if m == k else v for m, v in enumerate(typical)))
+    sizes = [k for k, p in enumerate(parameters) if p.size]
+    if len(sizes) > 1:  # each size alone
+        tries += [tuple(v if m == k or m not in sizes else 0.0 for m, v in enumerate(typical)) for k in sizes]
+    return list(dict.fromkeys(tries))
+
+
+def all_parts(problem: Problem) -> list[Part]:
+    """Every effect of the library at every site."""
+    return [(e.id, site) for e in problem.model.effects.values() for site in e.sites]
+
+
+def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
+    """Simulate each part at each start on top of a fit; what diverges or moves nothing is left out."""
+    out = []
+    own = list(problem.values(base.candidate, base.x))
+    for part in parts:
+        candidate = Candidate((*base.candidate.parts, part))
+        for values in start_values(problem.model.effects[part[0]].parameters):
+            x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
+            change = problem.residual(candidate, x) - base.residual
+            if np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6:
+                out.append(Trial(part, values, change))
+    return out
+
+
+def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[Promise]:
+    """Singles (or pairs) of the trials, the most promising first, one entry for each part (or pair of parts).
+
+    Judged twice, and merged in turn: once with the unknowns that stand at a bound held there, once with them free,
+    because the right effect is what lets them come back from it.
+    """
+    held = _promises(problem, base, found, pairs, held=True)
+    free = _promises(problem, base, found, pairs, held=False)
+    merged: dict[tuple[Part, ...], Promise] = {}
+    for couple in zip_longest(held, free):
+        for one in couple:
+            if one is not None:
+                merged.setdefault(one.parts, one)
+    return list(merged.values())
+
+
+def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str, float]:
+    """Effect id -> how far its typical size would move the outputs, nuisance parameters answered: rms in sigmas.
+
+    The largest over its sites and starts; 0 where no trial moved anything. What is far below one could not have been
+    seen.
+    """
+    gram, _, _ = _projected(problem, base, found, held=False)
+    count = float(np.count_nonzero(problem.weight[problem.fitted]))
+    out = dict.fromkeys(problem.model.effects, 0.0)
+    for trial, square in zip(found, np.diag(gram), strict=True):
+        out[trial.part[0]] = max(out[trial.part[0]], float(np.sqrt(max(square, 0.0) / count)))
+    return out
+
+
+def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool) -> list[Promise]:
+    gram, with_residual, total = _projected(problem, base, found, held)
+    signed = np.array([_signed(problem, trial) for trial in found], dtype=bool)
+    explained = _explained_by_pairs if pairs else _explained_alone
+    share, sizes, members = explained(gram, -with_residual, signed)
+    best: dict[tuple[Part, ...], Promise] = {}
+    for k in np.argsort(-share, kind="stable"):
+        if share[k] <= 0.0:
+            break
+        parts = tuple(found[m].part for m in members[k])
+        if parts in best or (pairs and not compatible(parts)):
+            continue
+        values = [_scaled(problem, found[m], s) for m, s in zip(members[k], sizes[k], strict=True)]
+        best[parts] = Promise(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
+    return list(best.values())
+
+
+def compatible(parts: tuple[Part, ...]) -> bool:
+    """Two sites of one effect only where they do not overlap."""
+    (first, site), (second, other) = parts
+    return first != second or (site != other and "both" not in (site, other))
+
+
+def _signed(problem: Problem, trial: Trial) -> bool:
+    """Whether its sizes may as well be negative."""
+    return all(p.low < 0.0 for p in problem.model.effects[trial.part[0]].parameters if p.size)
+
+
+def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
+    """The trial's values with its sizes multiplied; kept within a factor of three, where the line may still be
+    believed.
+    """
+    factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
+    parameters = problem.model.effects[trial.part[0]].parameters
+    return tuple(
+        float(np.clip(v * factor, p.low, p.high)) if p.size else v
+        for v, p in zip(trial.values, parameters, strict=True)
+    )
+
+
+def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
+    """Gram matrix of the changes and their products with the residual, both free of what the base's unknowns can do."""
+    assert base.jacobian is not None
+    rows = problem.fitted
+    r = base.residual[rows]
+    limit = HUBER * robust_scale(r)
+    root = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-12)))
+    weighted = (r * root).ravel()
+    mean = float(np.mean(weighted**2))
+    strength = 1.0 / (CORRELATION * (COST_FLOOR + mean))
+    low, high = problem.bounds(base.candidate)
+    free = np.ones(len(base.x), dtype=bool)
+    if held:
+        free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
+    J = (base.jacobian[rows][:, :, free] * root[:, :, None]).reshape(weighted.size, -1)
+    prior = np.where(np.arange(len(base.x)) < problem.fixed, 1.0, 1e-9)[free]
+    solve = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))
+    if not found:
+        return np.zeros((0, 0)), np.zeros(0), 1.0
+    D = np.stack([(t.change[rows] * root).ravel() for t in found])
+    DJ = D @ J
+    gram = D @ D.T - strength * DJ @ solve @ DJ.T
+    with_residual = D @ weighted - strength * DJ @ (solve @ (J.T @ weighted))
+    return gram, with_residual, float(weighted @ weighted)
+
+
+def _explained_alone(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:
+    """What a multiple of each trial explains (zero where it would have to be negative and must not), the multiples
+    (T, 1), and the trials' numbers (T, 1).
+    """
+    size = b / np.maximum(np.diag(gram), 1e-12)
+    share = np.where((size > 0.0) | signed, b * size, 0.0)
+    return share, size[:, None], np.arange(len(b))[:, None]
+
+
+def _explained_by_pairs(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:
+    """The same for all pairs of trials, (P,), (P, 2), (P, 2); twins that nothing could tell apart, explain nothing."""
+    one, two = np.triu_indices(len(b), 1)
+    first, second = (np.maximum(np.diag(gram), 1e-12)[k] * (1.0 + 1e-9) for k in (one, two))
+    cross = gram[one, two]
+    alike = cross**2 > 0.995**2 * first * second
+    determinant = np.where(alike, 1.0, first * second - cross**2)
+    sizes = np.column_stack([second * b[one] - cross * b[two], first * b[two] - cross * b[one]]) / determinant[:, None]
+    members = np.column_stack([one, two])
+    allowed = ~alike & ((sizes > 0.0) | signed[members]).all(axis=1)
+    share = np.where(allowed, b[one] * sizes[:, 0] + b[two] * sizes[:, 1], 0.0)
+    return share, sizes, members

@@ -1,0 +1,178 @@
+"""Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
+
+Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than
+structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of
+the library are true to.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.solver import CORRELATION, Fit
+from pneumo_ros.paths import share_file
+
+FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
+TOLL = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
+SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What counts as evidence: floors for model form; :func:`null_thresholds` raises them where chance wins more.
+
+    Attributes
+    ----------
+    first, second : fall of log mean square that the first (second) effect must bring on the selection blocks
+    first_cost, second_cost : fall of the training cost that it must bring in any case
+    first_share, second_share : the same for each effective sample, a fall of the log mean square of the fitted data
+    alone : so many times the fall of the training cost is evidence for a first effect that the selection blocks neither
+        show nor deny
+    least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
+    model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
+        inferred from less
+    """
+
+    first: float = 0.1
+    second: float = 0.3
+    first_cost: float = 15.0
+    second_cost: float = 20.0
+    first_share: float = 0.2
+    second_share: float = 0.25
+    alone: float = 2.5
+    least: float = 0.06
+    model_form: float = 0.05
+
+
+@lru_cache(maxsize=1)
+def null_thresholds() -> Thresholds:
+    """The floors of :class:`Thresholds`, raised to what the worst of the null distribution wins by.
+
+    The table (config/tables/diagnosis_null.csv) holds, for simulated rigs inside their tolerances, what the best effect
+    won that was not there: over the refit (``added`` 1) and on top of a true effect (``added`` 2).
+    """
+    floor = Thresholds()
+    with share_file("config", "tables", "diagnosis_null.csv").open(newline="", encoding="utf-8") as handle:
+        rows = list(csv.DictReader(handle))
+
+    def worst(column: str, added: int) -> float:
+        return max((float(row[column]) for row in rows if int(row["added"]) == added), default=0.0)
+
+    return replace(
+        floor,
+        first=max(floor.first, worst("advantage", 1)),
+        second=max(floor.second, worst("advantage", 2)),
+        first_cost=max(floor.first_cost, worst("cost", 1)),
+        second_cost=max(floor.second_cost, worst("cost", 2)),
+        least=max(floor.least, worst("fall", 1)),
+    )
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A fit with its score on the selection blocks.
+
+    Attributes
+    ----------
+    fit : the candidate
+    level : mean square, sigmas
+    blocks : (B,) mean square of each selection block
+    stretch : sum of squares of the nuisance parameters, in prior sigmas
+    samples : effective number of fitted samples, what the training cost grows with
+    """
+
+    fit: Fit
+    level: float
+    blocks: Array
+    stretch: float
+    samples: float = 600.0
+
+    @property
+    def size(self) -> int:
+        """Number of effects."""
+        return len(self.fit.candidate.parts)
+
+    @property
+    def price(self) -> float:
+        """Training cost with the toll of its parameters. An effect at one end that was seen is preferred to the same at
+        both, where the other end's was not: on another road it would act.
+        """
+        wide = sum(site == "both" for _, site in self.fit.candidate.parts)
+        return self.fit.cost + TOLL * (len(self.fit.x) + wide)
+
+
+def score(problem: Problem, fit: Fit) -> Scored:
+    """Mean squares on the selection blocks; samples that are missing do not count."""
+    there = problem.weight > 0.0
+    squares = np.where(there, fit.residual**2, 0.0)
+    blocks = []
+    for number in np.unique(problem.block[~problem.fitted]):
+        rows = problem.block == number
+        blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
+    values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
+    stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
+    samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / CORRELATION
+    return Scored(fit, float(np.mean(values)), values, stretch, float(samples))
+
+
+def noise_level(problem: Problem) -> float:
+    """What white sensor noise alone leaves of the mean square: less than one, sigmas hold a floor for model form."""
+    there = problem.weight > 0.0
+    return float(np.sum((problem.weight * problem.noise) ** 2) / max(1, there.sum()))
+
+
+def advantage(poorer: Scored, richer: Scored) -> float:
+    """Fall of log mean square from the poorer to the richer structure."""
+    return float(np.log((FORM + poorer.level) / (FORM + richer.level)))
+
+
+def standard_error(one: Scored, other: Scored) -> float:
+    """Of the difference of their levels over the blocks."""
+    difference = one.blocks - other.blocks
+    if len(difference) < 2:
+        return 0.0
+    return float(np.std(difference, ddof=1) / np.sqrt(len(difference)))
+
+
+def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Scored:
+    """The chosen structure; the refit itself when nothing beats it by enough."""
+    chosen = refit
+    wanted = (
+        (1, limits.first, max(limits.first_cost, limits.first_share * refit.samples)),
+        (2, limits.second, max(limits.second_cost, limits.second_share * refit.samples)),
+    )
+    for size, gain, cost in wanted:
+        rivals = [f for f in finalists if f.size == size]
+        if not rivals:
+            continue
+        best = _simplest(rivals)
+        poorer = chosen
+        fallen = poorer.level - best.level
+        paid = poorer.fit.cost - best.fit.cost
+        shown = advantage(poorer, best) > gain and fallen > limits.least and paid > cost
+        if size == 1:
+            # A stop that is hit once lies in one block: where the kept blocks say nothing, the fit must say it by far.
+            evidence = shown or (paid > limits.alone * cost and fallen > -SAME * poorer.level)
+        else:
+            evidence = shown and fallen > limits.model_form**2 * refit.level
+        if evidence:
+            chosen = best
+    return chosen
+
+
+def _simplest(rivals: Sequence[Scored]) -> Scored:
+    """Among those within one standard error of the best: the lowest price.
+
+    The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
+    structures that predict alike, the one that needs no stretched tolerance is right.
+    """
+    best = min(rivals, key=lambda s: s.level)
+    close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
+    return min(close, key=lambda s: s.price)

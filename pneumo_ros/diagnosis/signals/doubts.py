@@ -1,0 +1,89 @@
+"""Mistakes of whole topics that would otherwise look like an effect: gauge pressure, a clock set, a wrong unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.signals.types import TopicData
+from pneumo_ros.errors import InputError
+from pneumo_ros.plant.air_spring import effective_area, load_surface
+from pneumo_ros.rig import Rig
+from pneumo_ros.units import GRAVITY
+
+ROAD_LIMIT = 0.5  # m; the exciter moves by centimetres
+CLOCK_STEP = 0.05  # s by which a topic's delay may move against the others: a stalled recorder delays all alike
+PIECES = 3  # the delay of the first third is compared with the last third's
+# Spring force over static load at the middle of a log. An atmosphere is 0.6 of the front spring's gauge pressure and
+# 0.3 of the rear's: gauge pressures read as absolute carry about 0.56 and 0.77. An area or a load that is off by a
+# tenth at both ends stays outside.
+CARRIED, NOT_CARRIED = (0.9, 1.1), 0.85
+
+
+def check_road_unit(heights: Array, log: str) -> None:
+    """Refuse a road (N, 2) that cannot be in metres."""
+    largest = float(np.max(np.abs(heights)))
+    if largest > ROAD_LIMIT:
+        raise InputError(
+            "road height not in metres", where=f"{log}, /road/profile", value=round(largest, 6),
+            allowed=f"up to {ROAD_LIMIT} m", remedy="convert the log (mm or in to m)",
+        )  # fmt: skip
+
+
+def check_clocks(topics: Mapping[str, TopicData], log: str) -> None:
+    """Refuse a log in which one topic's stamps moved against the others' while it ran.
+
+    The delay from stamp to log time is compared between the first and the last third of each topic, relative to the
+    middle of all topics, so that a recorder that stalls and a log that was written slowly do no harm.
+    """
+    moved = {topic: _delay_change(data) for topic, data in topics.items() if _judged(data)}
+    if len(moved) < PIECES:
+        return
+    common = float(np.median(list(moved.values())))
+    late = {topic: change - common for topic, change in moved.items() if abs(change - common) > CLOCK_STEP}
+    if late:
+        worst = max(late, key=lambda topic: abs(late[topic]))
+        raise InputError(
+            "the clock of some topics was set while the log ran, so the topics share no time base",
+            where=f"{log}, {', '.join(sorted(late))}", value=f"{-late[worst]:.3g} s",
+            remedy="cut the log before the jump, or record it again",
+        )  # fmt: skip
+
+
+def _judged(data: TopicData) -> bool:
+    return data.received is not None and len(data.stamp) >= 10 * PIECES
+
+
+def _delay_change(data: TopicData) -> float:
+    assert data.received is not None
+    delay = data.received - data.stamp
+    piece = len(delay) // PIECES
+    return float(np.median(delay[-piece:]) - np.median(delay[:piece]))
+
+
+def check_gauge(heights: Array, pressures: Array, rig: Rig, log: str) -> None:
+    """Refuse pressures that carry the body only when they are read as gauge.
+
+    Parameters
+    ----------
+    heights, pressures : (2,) medians of both springs, m and Pa; NaN where either was not measured
+    """
+    known = np.isfinite(heights + pressures)
+    if known.any() and all(_reads_as_gauge(heights[k], pressures[k], rig, k) for k in np.flatnonzero(known).tolist()):
+        raise InputError(
+            "pressures look like gauge, not absolute: read as absolute they do not carry the body", where=log,
+            value=", ".join(f"{p:.0f} Pa" for p in pressures[known]), remedy="add the ambient pressure to the log's",
+        )  # fmt: skip
+
+
+def _reads_as_gauge(height: float, pressure: float, rig: Rig, end: int) -> bool:
+    a, b = rig.front_arm.value, rig.rear_arm.value
+    load = rig.sprung_mass.value * GRAVITY * (b, a)[end] / (a + b)
+    absolute, gauge = (_force(height, over, rig) / load for over in (pressure - rig.ambient_pressure.value, pressure))
+    return absolute < NOT_CARRIED and CARRIED[0] < gauge < CARRIED[1]
+
+
+def _force(height: float, gauge: float, rig: Rig) -> float:
+    return gauge * rig.effective_area_scale.value * float(effective_area(height, gauge, load_surface()))

@@ -1,0 +1,14 @@
+"""Where the gap lives: equation residuals in weak form, flexible corrections by place, regimes, conditional runs."""
+
+from pneumo_ros.diagnosis.where.conditional import conditional_gaps as conditional_gaps
+from pneumo_ros.diagnosis.where.corrected_run import place_gaps as place_gaps
+from pneumo_ros.diagnosis.where.corrected_run import predict_located as predict_located
+from pneumo_ros.diagnosis.where.gain import FlexibleGain as FlexibleGain
+from pneumo_ros.diagnosis.where.gain import flexible_gain as flexible_gain
+from pneumo_ros.diagnosis.where.law import Law as Law
+from pneumo_ros.diagnosis.where.law import missing_law as missing_law
+from pneumo_ros.diagnosis.where.locate import Location as Location
+from pneumo_ros.diagnosis.where.locate import Start as Start
+from pneumo_ros.diagnosis.where.locate import locate as locate
+from pneumo_ros.diagnosis.where.regions import Habitat as Habitat
+from pneumo_ros.diagnosis.where.regions import habitat as habitat

@@ -1,0 +1,43 @@
+"""Shapes of an error in a spring's force (area, friction, damping, hysteresis, stops)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pneumo_ros.diagnosis.where.features import Features, dragged, lagged, resonated
+from pneumo_ros.diagnosis.where.flexible.basis import Basis
+
+FRICTION = 10.0  # N, size of a friction shape
+STIFFNESS = 2000.0  # N/m
+DAMPING = 100.0  # N s/m
+SPEEDS = (0.005, 0.02, 0.06, 0.2)  # m/s at which friction saturates
+SLACKS = (5e-5, 3e-4, 1.5e-3)  # m of creep before slip
+MEMORIES = (0.02, 0.1, 0.5)  # s
+MODES = (40.0, 60.0, 80.0, 100.0, 130.0, 170.0)  # rad/s of a bellows mode: between the body's and what a window passes
+
+
+def force_bases(features: Features, i: int) -> list[Basis]:
+    """Spring force at end ``i`` (0 front, 1 rear), N, up on the body."""
+    end, dt = features.ends[i], features.period
+    x, v = end.travel, end.travel_rate
+    load = end.gauge / features.yardstick.gauge[i]
+    shapes = {f"friction {s:g} m/s": FRICTION * np.tanh(v / s) for s in SPEEDS}
+    shapes |= {
+        "damping": DAMPING * v,
+        "quadratic damping": 5.0 * DAMPING * v * np.abs(v),
+        "rebound damping": DAMPING * np.maximum(v, 0.0),
+        "stiffness": STIFFNESS * x,
+        "stiffness 2": 100.0 * STIFFNESS * x**2,
+        "stiffness 3": 1e4 * STIFFNESS * x**3,
+        "constant": np.full_like(x, FRICTION),
+        "load friction": FRICTION * load * np.tanh(v / 0.02),
+        "load damping": DAMPING * load * v,
+        "load": 2.0 * FRICTION * (load - 1.0),
+        "load 2": 10.0 * FRICTION * (load - 1.0) ** 2,
+        "load stiffness": STIFFNESS * (load - 1.0) * x,
+    }
+    shapes |= {f"relaxation {m:g} s": STIFFNESS * (x - lagged(x, m, dt)) for m in MEMORIES}
+    shapes |= {f"creep {s:g} m": FRICTION * dragged(x, s) for s in SLACKS}
+    shapes |= {f"mode {w:g} rad/s": 0.25 * STIFFNESS * (resonated(x, w, 0.1, dt) - x) for w in MODES}
+    place = f"{('front', 'rear')[i]}_force"
+    return [Basis(place, name, "force", i, series) for name, series in shapes.items()]

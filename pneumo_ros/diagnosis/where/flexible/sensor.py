@@ -1,0 +1,29 @@
+"""Shapes of an error in a measured channel (offset, scale, lag, curvature)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pneumo_ros.diagnosis.signals import MEASURED
+from pneumo_ros.diagnosis.where.features import Features, lagged
+from pneumo_ros.diagnosis.where.flexible.basis import Basis
+
+LAGS = (0.005, 0.02, 0.08)  # s; the last for gauge lines
+SHARE = 0.1
+
+
+def sensor_bases(features: Features) -> list[Basis]:
+    """What to add to a measured channel to undo its error, in the channel's unit."""
+    out = []
+    for column, channel in enumerate(MEASURED):
+        size = features.yardstick.channel_scale[column]
+        swing = features.smooth[:, column] - features.yardstick.channel_mean[column]
+        shapes = {
+            "offset": np.full_like(swing, SHARE * size),
+            "scale": SHARE * swing,
+            "curvature": SHARE * (swing**2 / size - size),
+            "drift": SHARE * size * features.time / 10.0,
+        }
+        shapes |= {f"lag {t:g} s": swing - lagged(swing, t, features.period) for t in LAGS}
+        out += [Basis(f"sensor:{channel}", name, "sensor", column, series) for name, series in shapes.items()]
+    return out
