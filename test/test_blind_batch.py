@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from pneumo_ros.casemaker.plan import plan
 from pneumo_ros.cli.blind_batch import run_all
 from pneumo_ros.cli.blind_work import make_case
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.reading import read_log
-from pneumo_ros.twin.plan import plan
 
 CASES = plan("ci")[:3]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from pneumo_ros.casemaker.plan import plan
 from pneumo_ros.cli.blind import app, read_manifest, seal_set
 from pneumo_ros.errors import InputError
-from pneumo_ros.twin.plan import plan
 
 NAMES = [case.name for case in plan("ci")]
 RUNNER = CliRunner()

@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
+from pneumo_ros.casemaker.catalogue import known_effects
+from pneumo_ros.casemaker.plan import SETS, plan
+from pneumo_ros.casemaker.scoring import metrics as m
+from pneumo_ros.casemaker.scoring.baselines import applied
+from pneumo_ros.casemaker.scoring.calibration import expected_error, risk_coverage
+from pneumo_ros.casemaker.scoring.intervals import Share
+from pneumo_ros.casemaker.scoring.report import write_report
+from pneumo_ros.casemaker.scoring.results import Found, load_results, parse
+from pneumo_ros.casemaker.seal import opened, sealed
 from pneumo_ros.errors import InputError
-from pneumo_ros.twin.catalogue import known_effects
-from pneumo_ros.twin.plan import SETS, plan
-from pneumo_ros.twin.scoring import metrics as m
-from pneumo_ros.twin.scoring.baselines import applied
-from pneumo_ros.twin.scoring.calibration import expected_error, risk_coverage
-from pneumo_ros.twin.scoring.intervals import Share
-from pneumo_ros.twin.scoring.report import write_report
-from pneumo_ros.twin.scoring.results import Found, load_results, parse
-from pneumo_ros.twin.seal import opened, sealed
 
 
 def label(case: str, kind: str, *truth: tuple[str, str | None], ratio: float = 5.0) -> dict[str, Any]:

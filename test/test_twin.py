@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneumo_ros.casemaker import catalogue, contact
+from pneumo_ros.casemaker.case import bench
+from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING, Controller
+from pneumo_ros.casemaker.excitation import ROADS, road, valve_steps
+from pneumo_ros.casemaker.gap_size import free_run, gap, refit
+from pneumo_ros.casemaker.parameters import End, TwinRig, twin_of
+from pneumo_ros.casemaker.scene import PERIOD, Scene, observation, play
+from pneumo_ros.casemaker.simulate import Run, simulate
+from pneumo_ros.casemaker.trim import prepared, residual, rest_of
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
-from pneumo_ros.twin import catalogue, contact
-from pneumo_ros.twin.case import bench
-from pneumo_ros.twin.controller import ACTIVE, LEVELLING, Controller
-from pneumo_ros.twin.excitation import ROADS, road, valve_steps
-from pneumo_ros.twin.gauge import free_run, gap, refit
-from pneumo_ros.twin.parameters import End, TwinRig, twin_of
-from pneumo_ros.twin.scene import PERIOD, Scene, observation, play
-from pneumo_ros.twin.simulate import Run, simulate
-from pneumo_ros.twin.trim import prepared, residual, rest_of
 
 RIG = load_rig()
 CAR, TRIM = nominal_half_car(RIG)

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pneumo_ros.casemaker.case import bench, made, simulated
+from pneumo_ros.casemaker.draw import WIDEST, drawn_rig, scenes
+from pneumo_ros.casemaker.excitation import ROADS
+from pneumo_ros.casemaker.log_file import write_log
+from pneumo_ros.casemaker.plan import Planned, plan
+from pneumo_ros.casemaker.scene import PERIOD, SAMPLES
 from pneumo_ros.log.reading import read_log
-from pneumo_ros.twin.case import bench, made, simulated
-from pneumo_ros.twin.draw import WIDEST, drawn_rig, scenes
-from pneumo_ros.twin.excitation import ROADS
-from pneumo_ros.twin.log import write_log
-from pneumo_ros.twin.plan import Planned, plan
-from pneumo_ros.twin.scene import PERIOD, SAMPLES
 
 ON = bench()
 FRICTION = Planned("x", "single", (("coulomb_friction", "front"),), 5.0, (), 11, False)

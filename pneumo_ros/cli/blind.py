@@ -15,7 +15,7 @@ from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from pneumo_ros.twin.scoring.results import Found
+    from pneumo_ros.casemaker.scoring.results import Found
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
@@ -42,8 +42,8 @@ def make(
 
     Finished cases are kept: the same command goes on after an interruption. A case takes about 10 s of one core.
     """
+    from pneumo_ros.casemaker.plan import plan
     from pneumo_ros.cli.blind_work import make_case
-    from pneumo_ros.twin.plan import plan
 
     cases = [case for case in plan(set_name) if only in case.name][: first or None]
     if not cases:
@@ -85,9 +85,9 @@ def score(
     ] = None,
 ) -> None:
     """Open the answers, check their seals, score the diagnosis and four baselines."""
-    from pneumo_ros.twin.scoring.report import write_report
-    from pneumo_ros.twin.scoring.results import load_results
-    from pneumo_ros.twin.seal import opened
+    from pneumo_ros.casemaker.scoring.report import write_report
+    from pneumo_ros.casemaker.scoring.results import load_results
+    from pneumo_ros.casemaker.seal import opened
 
     manifest = read_manifest(folder)
     digests = {entry["name"]: entry["label_sha256"] for entry in manifest["cases"]}
@@ -149,8 +149,8 @@ def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int,
 
 def seal_set(folder: Path, set_name: str, names: Sequence[str]) -> None:
     """Write manifest.json and labels.json; what is sealed already keeps its seal, new cases are added."""
-    from pneumo_ros.twin.plan import plan, seed_of
-    from pneumo_ros.twin.seal import sealed
+    from pneumo_ros.casemaker.plan import plan, seed_of
+    from pneumo_ros.casemaker.seal import sealed
 
     before = read_manifest(folder)["cases"] if (folder / "manifest.json").exists() else []
     entries = json.loads((folder / "labels.json").read_text(encoding="utf-8")) if before else []

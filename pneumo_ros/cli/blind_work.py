@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 
 from pneumo_ros import __version__
-from pneumo_ros.twin.case import made
-from pneumo_ros.twin.plan import Planned
+from pneumo_ros.casemaker.case import made
+from pneumo_ros.casemaker.plan import Planned
 
 
 def make_case(item: tuple[Planned, str]) -> None:

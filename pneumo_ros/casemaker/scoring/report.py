@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pneumo_ros.casemaker.plan import plan
+from pneumo_ros.casemaker.scoring import metrics as m
+from pneumo_ros.casemaker.scoring.baselines import applied
+from pneumo_ros.casemaker.scoring.calibration import expected_error, reliability, risk_coverage
+from pneumo_ros.casemaker.scoring.intervals import Share, share
+from pneumo_ros.casemaker.scoring.metrics import Case, Label, cases_of
+from pneumo_ros.casemaker.scoring.results import Found
 from pneumo_ros.errors import InputError
-from pneumo_ros.twin.plan import plan
-from pneumo_ros.twin.scoring import metrics as m
-from pneumo_ros.twin.scoring.baselines import applied
-from pneumo_ros.twin.scoring.calibration import expected_error, reliability, risk_coverage
-from pneumo_ros.twin.scoring.intervals import Share, share
-from pneumo_ros.twin.scoring.metrics import Case, Label, cases_of
-from pneumo_ros.twin.scoring.results import Found
 
 Measure = Callable[[Sequence[Case]], Share | float]
 

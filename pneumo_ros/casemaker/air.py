@@ -10,8 +10,8 @@ import math
 
 from numba import njit
 
+from pneumo_ros.casemaker.parameters import End, Frame
 from pneumo_ros.plant.orifice import mass_flow
-from pneumo_ros.twin.parameters import End, Frame
 from pneumo_ros.units import GAS_CONSTANT
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.twin.catalogue import known_effects
-from pneumo_ros.twin.scoring.results import Found
+from pneumo_ros.casemaker.catalogue import known_effects
+from pneumo_ros.casemaker.scoring.results import Found
 
 PLACES = ("front_force", "rear_force", "front_air", "rear_air", "front_tyre", "rear_tyre", "body_heave", "body_pitch",
           "road_input", "supply")  # fmt: skip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.twin.catalogue import QUICKEST, Applied, at_ends, effect, ends_of, in_frame, places_of, sign
-from pneumo_ros.twin.parameters import TwinRig
+from pneumo_ros.casemaker.catalogue import QUICKEST, Applied, at_ends, effect, ends_of, in_frame, places_of, sign
+from pneumo_ros.casemaker.parameters import TwinRig
 
 Rng = np.random.Generator
 NOMINAL_OPENING = 7e-7  # m2, about what an inlet has at rest

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pneumo_ros.twin.parameters import End
+from pneumo_ros.casemaker.parameters import End
 
 
 @njit(cache=True)

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.casemaker.catalogue import Applied, get
+from pneumo_ros.casemaker.draw import drawn_rig, real_twin, scenes
+from pneumo_ros.casemaker.gap_size import NUISANCE, Null, null_of, quick_gap, refit
+from pneumo_ros.casemaker.log_file import write_log
+from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.plan import Planned
+from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.twin.catalogue import Applied, get
-from pneumo_ros.twin.draw import drawn_rig, real_twin, scenes
-from pneumo_ros.twin.gauge import NUISANCE, Null, null_of, quick_gap, refit
-from pneumo_ros.twin.log import write_log
-from pneumo_ros.twin.parameters import TwinRig
-from pneumo_ros.twin.plan import Planned
-from pneumo_ros.twin.scene import Scene, Session, inside_bounds, observation, play
 
 Logs = NDArray[np.float64]
 LOGS = ("fit", "holdout", "edit")

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from pneumo_ros.casemaker.catalogue import at_ends
+from pneumo_ros.casemaker.excitation import ROADS
+from pneumo_ros.casemaker.parameters import TwinRig, twin_of
+from pneumo_ros.casemaker.scene import Scene
 from pneumo_ros.rig import LIMITS, Rig
-from pneumo_ros.twin.catalogue import at_ends
-from pneumo_ros.twin.excitation import ROADS
-from pneumo_ros.twin.parameters import TwinRig, twin_of
-from pneumo_ros.twin.scene import Scene
 from pneumo_ros.units import PSI
 
 WIDEST = 2.5  # sigma: tolerances are drawn normal, cut here

@@ -8,12 +8,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pneumo_ros.casemaker.air import sonic_mass
+from pneumo_ros.casemaker.controller import Controller, control
+from pneumo_ros.casemaker.derivative import FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE, SPOOL, TANK, derivative
+from pneumo_ros.casemaker.parameters import End, Frame, TwinRig
+from pneumo_ros.casemaker.valve import delayed, spool_target
 from pneumo_ros.plant.air_spring import AreaSurface
-from pneumo_ros.twin.air import sonic_mass
-from pneumo_ros.twin.controller import Controller, control
-from pneumo_ros.twin.derivative import FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE, SPOOL, TANK, derivative
-from pneumo_ros.twin.parameters import End, Frame, TwinRig
-from pneumo_ros.twin.valve import delayed, spool_target
 from pneumo_ros.units import GRAVITY
 
 STEP = 0.25e-3  # s: a bristle that gives way at 0.2 mm and 0.3 m/s has a rate of 1500/s

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from pneumo_ros.casemaker.scene import PERIOD, Session
 from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
 from pneumo_ros.log.topics import COMMAND, CONFIG, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, ROAD
 from pneumo_ros.log.writing import LogWriter
 from pneumo_ros.rig import Rig
-from pneumo_ros.twin.scene import PERIOD, Session
 
 NANO = 1e9
 

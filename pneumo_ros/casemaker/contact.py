@@ -6,7 +6,7 @@ import math
 
 from numba import njit
 
-from pneumo_ros.twin.parameters import End
+from pneumo_ros.casemaker.parameters import End
 
 
 @njit(cache=True)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.twin.plan import GRADES
-from pneumo_ros.twin.scoring.intervals import Share, share
-from pneumo_ros.twin.scoring.results import Found
+from pneumo_ros.casemaker.plan import GRADES
+from pneumo_ros.casemaker.scoring.intervals import Share, share
+from pneumo_ros.casemaker.scoring.results import Found
 
 CLEAR = 1.9  # gap over null floor from which an effect must be named: grade 2 within the maker's tolerance
 Label = Mapping[str, Any]

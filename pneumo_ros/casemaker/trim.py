@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from pneumo_ros.casemaker import air
+from pneumo_ros.casemaker.derivative import COLUMN, FRONT, REAR, SIZE, TANK, derivative
+from pneumo_ros.casemaker.parameters import End, TwinRig
+from pneumo_ros.casemaker.simulate import Rest, initial_state
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area
-from pneumo_ros.twin import air
-from pneumo_ros.twin.derivative import COLUMN, FRONT, REAR, SIZE, TANK, derivative
-from pneumo_ros.twin.parameters import End, TwinRig
-from pneumo_ros.twin.simulate import Rest, initial_state
 from pneumo_ros.units import GRAVITY, PSI
 
 

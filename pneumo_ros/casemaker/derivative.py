@@ -13,11 +13,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pneumo_ros.casemaker import air
+from pneumo_ros.casemaker.contact import bouc_wen_rate, hunt_crossley, lugre, lugre_level, tyre_force, viscous
+from pneumo_ros.casemaker.parameters import End, Frame
+from pneumo_ros.casemaker.valve import opening_of
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area
-from pneumo_ros.twin import air
-from pneumo_ros.twin.contact import bouc_wen_rate, hunt_crossley, lugre, lugre_level, tyre_force, viscous
-from pneumo_ros.twin.parameters import End, Frame
-from pneumo_ros.twin.valve import opening_of
 from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 
 BLOCK = 13

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pneumo_ros.casemaker.catalogue import get, known_effects, unknown_kinds
 from pneumo_ros.errors import InputError
-from pneumo_ros.twin.catalogue import get, known_effects, unknown_kinds
 
 GRADES = (1.2, 2.0, 5.0, 20.0)
 IMPERFECT_SHARE = 0.35  # of the cases have jitter, lost samples or slower channels

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING
+from pneumo_ros.casemaker.excitation import road, valve_steps, valve_waves
+from pneumo_ros.casemaker.gap_size import Observation
+from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.simulate import Run, simulate
+from pneumo_ros.casemaker.trim import prepared, rest_of
 from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.rig import Rig
-from pneumo_ros.twin.controller import ACTIVE, LEVELLING
-from pneumo_ros.twin.excitation import road, valve_steps, valve_waves
-from pneumo_ros.twin.gauge import Observation
-from pneumo_ros.twin.parameters import TwinRig
-from pneumo_ros.twin.simulate import Run, simulate
-from pneumo_ros.twin.trim import prepared, rest_of
 
 PERIOD = 0.002  # s, 500 Hz
 SAMPLES = 7500
@@ -30,7 +30,7 @@ class Scene:
 
     Attributes
     ----------
-    road : kind of :mod:`pneumo_ros.twin.excitation`
+    road : kind of :mod:`pneumo_ros.casemaker.excitation`
     gain : factor on its heights
     controller : levelling or active
     valves : steps or waves

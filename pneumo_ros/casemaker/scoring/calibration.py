@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.twin.scoring.metrics import Case
+from pneumo_ros.casemaker.scoring.metrics import Case
 
 BINS = 10
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.twin.catalogue import QUICKEST, Applied, at_ends, effect, in_frame, places_of, sign
-from pneumo_ros.twin.parameters import TwinRig
+from pneumo_ros.casemaker.catalogue import QUICKEST, Applied, at_ends, effect, in_frame, places_of, sign
+from pneumo_ros.casemaker.parameters import TwinRig
 
 Rng = np.random.Generator
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pneumo_ros.twin.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import TwinRig
 
 QUICKEST = 3e-4  # s: a second order lag below this is too quick for the integrator's step
 SIDES = ("front", "rear", "both")
@@ -123,4 +123,4 @@ def get(name: str) -> Effect:
 
 
 def _load() -> None:
-    from pneumo_ros.twin import known_air, known_force, known_sensor, unknown  # noqa: F401
+    from pneumo_ros.casemaker import known_air, known_force, known_sensor, unknown  # noqa: F401
