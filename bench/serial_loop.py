@@ -18,8 +18,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
 
-from serial_rig import PERIOD, Loop, SerialRig
-from simulated_rig import Bench
+from helpers.serial_rig import PERIOD, Loop, SerialRig
+from helpers.simulated_rig import Bench
 
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.daq.actuation import Mode

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from helpers.folders import DOCS
 
 pytest.importorskip("rclpy")
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "test"))
-import sessions
+from helpers import sessions
 
 from pneumo_ros.cli.reference import documents
 from pneumo_ros.log import topics
 from pneumo_ros.log.reading import Log, read_log
 from pneumo_ros.nodes.interfaces import message_class
 
-DOCS = Path(__file__).resolve().parent.parent / "docs"
 PLAUSIBLE = {  # unit -> largest magnitude a running rig can show
     "m": 0.2,
     "rad": 0.3,

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 import typer.main
+from helpers.folders import ROOT
 
 from pneumo_ros.cli.main import VERBS, app
 
-ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TYPED = re.compile(r"\bpneumo ((?:[a-z][a-z-]* )*[a-z][a-z-]*)([^`|\n]*)")
 

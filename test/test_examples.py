@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-
-import numpy as np
-import pytest
-
-from pneumo_ros.errors import InputError
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "examples"))
 
 import frame_friction
 import leaking_chamber
+import numpy as np
+import pytest
 
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active
+from pneumo_ros.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from helpers.folders import ROOT
 
 from pneumo_ros.cli.run import node_tables
 
-ROOT = Path(__file__).parent.parent
 TREE = ast.parse((ROOT / "launch" / "rig.launch.py").read_text(encoding="utf-8"))
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.casemaker.catalogue import Applied, get
-from pneumo_ros.casemaker.draw import drawn_rig, real_twin, scenes
+from pneumo_ros.casemaker.draw import drawn_rig, imperfect_rig, scenes
 from pneumo_ros.casemaker.gap_size import NUISANCE, Null, null_of, quick_gap, refit
 from pneumo_ros.casemaker.log_file import write_log
-from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import RicherRig
 from pneumo_ros.casemaker.plan import Planned
 from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
 from pneumo_ros.plant.half_car import HalfCar
@@ -100,13 +100,13 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
 def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
     rng = np.random.default_rng(case.seed if draw == 0 else [case.seed, draw])
     drawn, sigmas = drawn_rig(on.nominal, rng)
-    twin = real_twin(drawn, on.nominal, on.references, rng)
-    fit, held, edit = (_rideable(scene, twin, on) for scene in scenes(rng, case.imperfect))
+    real = imperfect_rig(drawn, on.nominal, on.references, rng)
+    fit, held, edit = (_rideable(scene, real, on) for scene in scenes(rng, case.imperfect))
     effect_seed = int(rng.integers(1, 2**31))
-    null = null_of(on.car, observation(play(twin, on.nominal, fit, on.car.surface), on.nominal))
-    graded = _graded(case, twin, fit, null, effect_seed, on)
-    rig, road_gain = _combined(twin, graded.applied)
-    held, shown, held_floor = _telling(held, twin, rig, road_gain, 0.5 * case.grade, on)
+    null = null_of(on.car, observation(play(real, on.nominal, fit, on.car.surface), on.nominal))
+    graded = _graded(case, real, fit, null, effect_seed, on)
+    rig, road_gain = _combined(real, graded.applied)
+    held, shown, held_floor = _telling(held, real, rig, road_gain, 0.5 * case.grade, on)
     three = (fit, held, edit)
     sessions = [play(rig, on.nominal, scene, on.car.surface, road_gain) for scene in three]
     label = {
@@ -134,17 +134,17 @@ def _config(nominal: Rig, scene: Scene) -> Rig:
     )
 
 
-def _rideable(scene: Scene, twin: TwinRig, on: Bench) -> Scene:
+def _rideable(scene: Scene, real: RicherRig, on: Bench) -> Scene:
     """The scene with its road lowered until tyres stay loaded and springs inside their table."""
     for _ in range(12):
-        if inside_bounds(on.car, play(twin, on.nominal, scene, on.car.surface)):
+        if inside_bounds(on.car, play(real, on.nominal, scene, on.car.surface)):
             return scene
         scene = replace(scene, gain=0.87 * scene.gain, valve_size=0.95 * scene.valve_size)
     return scene
 
 
 def _telling(
-    held: Scene, twin: TwinRig, rig: TwinRig, road_gain: float, wanted: float, on: Bench
+    held: Scene, real: RicherRig, rig: RicherRig, road_gain: float, wanted: float, on: Bench
 ) -> tuple[Scene, float, float]:
     """The held-out scene, changed if it would hardly show the effect; with the gap in it and its null floor.
 
@@ -154,7 +154,7 @@ def _telling(
     best: tuple[Scene, float, float] | None = None
     for gain in (1.0, 1.35, 1.8):
         scene = held if gain == 1.0 else replace(held, valves="steps", gain=gain * held.gain)
-        floor, start = _refitted(play(twin, on.nominal, scene, on.car.surface), on)
+        floor, start = _refitted(play(real, on.nominal, scene, on.car.surface), on)
         value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, start)[0]
         if best is None or (math.isfinite(value) and value / floor > best[1] / best[2]):
             best = (scene, value, floor)
@@ -172,8 +172,8 @@ def _refitted(session: Session, on: Bench, start: Logs | None = None) -> tuple[f
     return refit(on.car, seen, start)
 
 
-def _applied(case: Planned, twin: TwinRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
-    out, rig = [], twin
+def _applied(case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
+    out, rig = [], real
     for (name, side), size in zip(case.effects, sizes, strict=True):
         # By name: an effect is the same alone, where it is sized, and in a pair.
         done = get(name).apply(rig, size, side, np.random.default_rng([seed, zlib.crc32(name.encode())]))
@@ -182,36 +182,36 @@ def _applied(case: Planned, twin: TwinRig, sizes: tuple[float, ...], seed: int) 
     return tuple(out)
 
 
-def _combined(twin: TwinRig, applied: tuple[Applied, ...]) -> tuple[TwinRig, float]:
+def _combined(real: RicherRig, applied: tuple[Applied, ...]) -> tuple[RicherRig, float]:
     if not applied:
-        return twin, 1.0
+        return real, 1.0
     return applied[-1].rig, max(item.road_gain for item in applied)
 
 
-def _graded(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
+def _graded(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
     """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
     sizes, weakest = [], math.inf
     for one in case.effects:
         size, alone = case.size, case.grade
         if size is None:
-            size, alone = _search(replace(case, effects=(one,)), twin, scene, null, seed, on)
+            size, alone = _search(replace(case, effects=(one,)), real, scene, null, seed, on)
         sizes.append(size)
         weakest = min(weakest, alone)
-    applied = _applied(case, twin, tuple(sizes), seed)
-    rig, road_gain = _combined(twin, applied)
+    applied = _applied(case, real, tuple(sizes), seed)
+    rig, road_gain = _combined(real, applied)
     value = null.gap
     if applied:
         value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
     return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, applied)
 
 
-def _search(case: Planned, twin: TwinRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
+def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
     """Size whose refit gap is ``case.grade`` floors, and how many it is: the quick ruler finds the neighbourhood, the
     refit decides.
     """
 
     def ratio_at(size: float, careful: bool) -> float:
-        rig, road_gain = _combined(twin, _applied(case, twin, (size,), seed))
+        rig, road_gain = _combined(real, _applied(case, real, (size,), seed))
         session = play(rig, on.nominal, scene, on.car.surface, road_gain)
         return _left(session, null, on, careful) / null.gap
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import RicherRig
 
 QUICKEST = 3e-4  # s: a second order lag below this is too quick for the integrator's step
 SIDES = ("front", "rear", "both")
@@ -31,7 +31,7 @@ class Applied:
     road_gain : factor the effect needs on the road's heights to be seen at all
     """
 
-    rig: TwinRig
+    rig: RicherRig
     parameters: Parameters
     places: tuple[str, ...]
     road_gain: float = 1.0
@@ -53,7 +53,7 @@ class Effect:
     id: str
     known: bool
     sides: tuple[str | None, ...]
-    apply: Callable[[TwinRig, float, str | None, np.random.Generator], Applied] = field(repr=False)
+    apply: Callable[[RicherRig, float, str | None, np.random.Generator], Applied] = field(repr=False)
     comparable: bool = False
 
 
@@ -62,14 +62,14 @@ def ends_of(side: str | None) -> tuple[str, ...]:
     return ("front", "rear") if side in ("both", None) else (side,)
 
 
-def at_ends(rig: TwinRig, side: str | None, **changes: float) -> TwinRig:
+def at_ends(rig: RicherRig, side: str | None, **changes: float) -> RicherRig:
     """The rig with parameters of one or both ends replaced."""
     for end in ends_of(side):
         rig = rig._replace(**{end: getattr(rig, end)._replace(**changes)})
     return rig
 
 
-def in_frame(rig: TwinRig, **changes: float) -> TwinRig:
+def in_frame(rig: RicherRig, **changes: float) -> RicherRig:
     """The rig with shared parameters replaced."""
     return rig._replace(frame=rig.frame._replace(**changes))
 
@@ -90,14 +90,14 @@ REGISTRY: dict[str, Effect] = {}
 def effect(
     name: str, *, known: bool = True, sides: tuple[str | None, ...] = SIDES, comparable: bool = False
 ) -> Callable[
-    [Callable[[TwinRig, float, str | None, np.random.Generator], Applied]],
-    Callable[[TwinRig, float, str | None, np.random.Generator], Applied],
+    [Callable[[RicherRig, float, str | None, np.random.Generator], Applied]],
+    Callable[[RicherRig, float, str | None, np.random.Generator], Applied],
 ]:
     """Register a function as an effect."""
 
     def register(
-        function: Callable[[TwinRig, float, str | None, np.random.Generator], Applied],
-    ) -> Callable[[TwinRig, float, str | None, np.random.Generator], Applied]:
+        function: Callable[[RicherRig, float, str | None, np.random.Generator], Applied],
+    ) -> Callable[[RicherRig, float, str | None, np.random.Generator], Applied]:
         REGISTRY[name] = Effect(name, known, sides, function, comparable)
         return function
 

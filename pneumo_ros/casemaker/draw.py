@@ -8,7 +8,7 @@ import numpy as np
 
 from pneumo_ros.casemaker.catalogue import at_ends
 from pneumo_ros.casemaker.excitation import ROADS
-from pneumo_ros.casemaker.parameters import TwinRig, twin_of
+from pneumo_ros.casemaker.parameters import RicherRig, richer_rig
 from pneumo_ros.casemaker.scene import Scene
 from pneumo_ros.rig import LIMITS, Rig
 from pneumo_ros.units import PSI
@@ -27,20 +27,20 @@ def drawn_rig(nominal: Rig, rng: np.random.Generator) -> tuple[Rig, dict[str, fl
     return nominal.with_values(**values), sigmas
 
 
-def real_twin(drawn: Rig, nominal: Rig, references: tuple[float, float], rng: np.random.Generator) -> TwinRig:
+def imperfect_rig(drawn: Rig, nominal: Rig, references: tuple[float, float], rng: np.random.Generator) -> RicherRig:
     """The richer rig of a drawn rig.
 
     The log carries the commanded outlet area, so its tolerance becomes a coefficient of the outlet. Every rig has
     traces of friction, tyre damping and wall heat, each well below the sensor noise: no rig is exactly its model, and
     a verdict must not hang on it.
     """
-    twin = twin_of(drawn, references)
+    real = richer_rig(drawn, references)
     for side in ("front", "rear"):
-        end = getattr(twin, side)
+        end = getattr(real, side)
         share = getattr(drawn, f"outlet_area_{side}").value / getattr(nominal, f"outlet_area_{side}").value
         friction = rng.uniform(0.0, 0.03)
-        twin = at_ends(
-            twin,
+        real = at_ends(
+            real,
             side,
             outlet_scale=end.outlet_scale * share,
             coulomb=friction,
@@ -49,7 +49,7 @@ def real_twin(drawn: Rig, nominal: Rig, references: tuple[float, float], rng: np
             tyre_damping=rng.uniform(0.0, 0.15),
             heat=rng.uniform(0.0, 0.004),
         )
-    return twin
+    return real
 
 
 def scenes(rng: np.random.Generator, imperfect: bool) -> tuple[Scene, Scene, Scene]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.casemaker.catalogue import QUICKEST, Applied, at_ends, effect, ends_of, in_frame, places_of, sign
-from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import RicherRig
 
 Rng = np.random.Generator
 NOMINAL_OPENING = 7e-7  # m2, about what an inlet has at rest
 
 
 @effect("valve_lag", comparable=True)
-def valve_lag(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def valve_lag(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Second order spool, up to 60 ms late in all."""
     late, ratio = max(0.06 * size, QUICKEST), rng.uniform(0.7, 1.0)
     changed = at_ends(rig, side, valve_frequency=2.0 * ratio / late, valve_damping=ratio)
@@ -20,20 +20,20 @@ def valve_lag(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
 
 
 @effect("valve_deadband", comparable=True)
-def valve_deadband(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def valve_deadband(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Overlap: the first part of the command, up to 60 % of the opening at rest, opens nothing."""
     overlap = 0.6 * NOMINAL_OPENING * size
     return Applied(at_ends(rig, side, valve_overlap=overlap), {"overlap": (overlap, "m2")}, places_of(side, "air"))
 
 
 @effect("transport_delay", comparable=True)
-def transport_delay(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def transport_delay(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Commands arrive up to 60 ms late."""
     return Applied(at_ends(rig, side, valve_delay=0.06 * size), {"delay": (0.06 * size, "s")}, places_of(side, "air"))
 
 
 @effect("leak")
-def leak(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def leak(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A crack with laminar flow (proportional to P2 - Pa2): up to half of what the outlet passes at rest."""
     changed = rig
     for end in ends_of(side):
@@ -46,7 +46,7 @@ def leak(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
 
 
 @effect("supply_droop", sides=(None,))
-def supply_droop(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def supply_droop(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A regulator that needs a pressure drop to pass air, up to 150 kPa for what the rig takes at rest, and a tank."""
     drop, tank = 150e3 * size, rng.uniform(0.3e-3, 1.5e-3)
     changed = in_frame(rig, tank_volume=tank, regulator=3.1e-3 / drop)
@@ -54,13 +54,13 @@ def supply_droop(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Appli
 
 
 @effect("heat_transfer")
-def heat_transfer(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def heat_transfer(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Heat from the gas to the wall, up to 3 W/K, with the gas's own mass and temperature."""
     return Applied(at_ends(rig, side, heat=3.0 * size), {"conductance": (3.0 * size, "W/K")}, places_of(side, "air"))
 
 
 @effect("effective_area_error")
-def effective_area_error(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def effective_area_error(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The bellows' area is off by up to 12 %, and its slope over height with it."""
     error, tilt = 0.12 * size * sign(rng), 4.0 * size * rng.uniform(-1.0, 1.0)
     changed = at_ends(rig, side, area_error=error, area_tilt=tilt)
@@ -68,14 +68,14 @@ def effective_area_error(rig: TwinRig, size: float, side: str | None, rng: Rng) 
 
 
 @effect("dead_volume", comparable=True)
-def dead_volume(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def dead_volume(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Fittings and hose add up to 50 ml to the spring's 72 ml."""
     return Applied(at_ends(rig, side, dead_volume=50e-6 * size), {"volume": (50e-6 * size, "m3")},
                    places_of(side, "air"))  # fmt: skip
 
 
 @effect("orifice_coefficient")
-def orifice_coefficient(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def orifice_coefficient(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The inlet passes up to 40 % less or more than its opening says, and less so as the flow unchokes (Perry)."""
     error, slope = 0.4 * size * sign(rng), 0.15 * size
     changed = rig

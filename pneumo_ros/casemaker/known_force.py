@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.casemaker.catalogue import QUICKEST, Applied, at_ends, effect, in_frame, places_of, sign
-from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import RicherRig
 
 Rng = np.random.Generator
 
 
 @effect("coulomb_friction")
-def coulomb_friction(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def coulomb_friction(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """LuGre: up to 20 N of slip friction, 1.1 to 1.35 of it at rest, giving way at 0.15 to 0.4 mm."""
     level, stick = 20.0 * size, rng.uniform(1.1, 1.35)
     give, stribeck = rng.uniform(1.5e-4, 4e-4), rng.uniform(0.006, 0.015)
@@ -23,7 +23,7 @@ def coulomb_friction(rig: TwinRig, size: float, side: str | None, rng: Rng) -> A
 
 
 @effect("viscous_damping")
-def viscous_damping(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def viscous_damping(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Damping beyond its tolerance, up to 150 N s/m, part of it growing with speed."""
     extra, share = 150.0 * size, rng.uniform(0.0, 0.3)
     changed = at_ends(rig, side, extra_damping=extra * (1.0 - share), quadratic_damping=extra * share / 0.1)
@@ -31,7 +31,7 @@ def viscous_damping(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Ap
 
 
 @effect("bellows_hysteresis")
-def bellows_hysteresis(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def bellows_hysteresis(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Bouc-Wen: up to 12 N/mm that slips at 0.8 to 2 mm."""
     stiffness, give, power = 12e3 * size, rng.uniform(0.8e-3, 2e-3), rng.uniform(1.0, 2.0)
     changed = at_ends(rig, side, bouc_stiffness=stiffness, bouc_yield=give, bouc_power=power)
@@ -40,7 +40,7 @@ def bellows_hysteresis(rig: TwinRig, size: float, side: str | None, rng: Rng) ->
 
 
 @effect("bellows_mode")
-def bellows_mode(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def bellows_mode(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A mass of the bellows' wall that swings at 8 to 16 Hz inside the spring, up to 0.6 kg."""
     frequency, mass, ratio = 2.0 * np.pi * rng.uniform(8.0, 16.0), 0.6 * size, rng.uniform(0.04, 0.12)
     changed = at_ends(rig, side, mode_stiffness=mass * frequency**2, mode_frequency=frequency, mode_damping=ratio)
@@ -49,21 +49,21 @@ def bellows_mode(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Appli
 
 
 @effect("tyre_damping", comparable=True)
-def tyre_damping(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def tyre_damping(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Viscous, up to 80 N s/m, on the difference between road and axle speed."""
     return Applied(at_ends(rig, side, tyre_damping=80.0 * size), {"tyre_damping": (80.0 * size, "N s/m")},
                    places_of(side, "tyre"))  # fmt: skip
 
 
 @effect("tyre_liftoff")
-def tyre_liftoff(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def tyre_liftoff(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The tyre cannot pull; seen once the road is rough enough: heights up to 3 times the usual ones."""
     gain = 1.0 + 2.0 * size
     return Applied(at_ends(rig, side, unilateral=1.0), {"road_gain": (gain, "1")}, places_of(side, "tyre"), gain)
 
 
 @effect("bump_stop")
-def bump_stop(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def bump_stop(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A rubber stop (Hunt-Crossley) that is met up to 13 mm above where the nominal one is."""
     above, stiffness = 13e-3 * size, rng.uniform(3e5, 1.2e6)
     changed = at_ends(rig, side, contact_height=rig.frame.stop_height + above, contact_stiffness=stiffness,
@@ -72,7 +72,7 @@ def bump_stop(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
 
 
 @effect("payload", sides=(None,), comparable=True)
-def payload(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def payload(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Up to 8 kg on the centre of mass that the rig file does not know of."""
     mass = 8.0 * size
     return Applied(in_frame(rig, sprung_mass=rig.frame.sprung_mass + mass), {"mass": (mass, "kg")},
@@ -80,7 +80,7 @@ def payload(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
 
 
 @effect("cg_shift", sides=(None,), comparable=True)
-def cg_shift(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def cg_shift(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Centre of mass up to 40 mm forward or backward of where the rig file has it."""
     shift = 0.04 * size * sign(rng)
     changed = rig._replace(front=rig.front._replace(arm=rig.front.arm - shift),
@@ -89,7 +89,7 @@ def cg_shift(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
 
 
 @effect("exciter_lag", comparable=True)
-def exciter_lag(rig: TwinRig, size: float, side: str | None, rng: Rng) -> Applied:
+def exciter_lag(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The hydraulic exciter follows its command as a second order system, up to 25 ms late."""
     late, ratio = max(0.025 * size, QUICKEST), rng.uniform(0.7, 1.0)
     changed = at_ends(rig, side, exciter_frequency=2.0 * ratio / late, exciter_damping=ratio)

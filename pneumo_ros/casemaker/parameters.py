@@ -125,7 +125,7 @@ class Frame(NamedTuple):
     base_damping: float = 0.05
 
 
-class TwinRig(NamedTuple):
+class RicherRig(NamedTuple):
     """A rig ready to simulate."""
 
     frame: Frame
@@ -133,7 +133,7 @@ class TwinRig(NamedTuple):
     rear: End
 
 
-def twin_of(rig: Rig, reference_pressures: tuple[float, float]) -> TwinRig:
+def richer_rig(rig: Rig, reference_pressures: tuple[float, float]) -> RicherRig:
     """The richer rig with every extra off: the contract's plant.
 
     Parameters
@@ -168,4 +168,4 @@ def twin_of(rig: Rig, reference_pressures: tuple[float, float]) -> TwinRig:
         )
         for side, reference in zip(("front", "rear"), reference_pressures, strict=True)
     )
-    return TwinRig(frame, front, rear)
+    return RicherRig(frame, front, rear)

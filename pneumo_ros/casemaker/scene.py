@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING
 from pneumo_ros.casemaker.excitation import road, valve_steps, valve_waves
 from pneumo_ros.casemaker.gap_size import Observation
-from pneumo_ros.casemaker.parameters import TwinRig
+from pneumo_ros.casemaker.parameters import RicherRig
 from pneumo_ros.casemaker.simulate import Run, simulate
 from pneumo_ros.casemaker.trim import prepared, rest_of
 from pneumo_ros.plant.air_spring import AreaSurface
@@ -82,7 +82,7 @@ class Session:
     kept: NDArray[np.bool_]
 
 
-def play(rig: TwinRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_gain: float = 1.0) -> Session:
+def play(rig: RicherRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_gain: float = 1.0) -> Session:
     """Simulate one log of a rig.
 
     Parameters

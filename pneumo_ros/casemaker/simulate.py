@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pneumo_ros.casemaker.air import sonic_mass
 from pneumo_ros.casemaker.controller import Controller, control
 from pneumo_ros.casemaker.derivative import FRONT, GAUGE, LOOSE, MASS, MODE, REAR, SIZE, SPOOL, TANK, derivative
-from pneumo_ros.casemaker.parameters import End, Frame, TwinRig
+from pneumo_ros.casemaker.parameters import End, Frame, RicherRig
 from pneumo_ros.casemaker.valve import delayed, spool_target
 from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.units import GRAVITY
@@ -58,7 +58,7 @@ def _start_end(x: NDArray[np.float64], at: int, index: int, arm: float, unsprung
     x[at + GAUGE] = x[index]
 
 
-def initial_state(core: NDArray[np.float64], inlets: tuple[float, float], rig: TwinRig) -> NDArray[np.float64]:
+def initial_state(core: NDArray[np.float64], inlets: tuple[float, float], rig: RicherRig) -> NDArray[np.float64]:
     """Complete a plant state (10,) with the extras at rest, (SIZE,)."""
     x = np.zeros(SIZE)
     x[:10] = core
@@ -175,7 +175,7 @@ def run(
 
 
 def simulate(
-    rig: TwinRig,
+    rig: RicherRig,
     rest: Rest,
     road: NDArray[np.float64],
     shake: NDArray[np.float64],

@@ -8,13 +8,13 @@ from scipy.optimize import brentq
 
 from pneumo_ros.casemaker import air
 from pneumo_ros.casemaker.derivative import COLUMN, FRONT, REAR, SIZE, TANK, derivative
-from pneumo_ros.casemaker.parameters import End, TwinRig
+from pneumo_ros.casemaker.parameters import End, RicherRig
 from pneumo_ros.casemaker.simulate import Rest, initial_state
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area
 from pneumo_ros.units import GRAVITY, PSI
 
 
-def rest_of(rig: TwinRig, outlets: tuple[float, float], surface: AreaSurface) -> Rest:
+def rest_of(rig: RicherRig, outlets: tuple[float, float], surface: AreaSurface) -> Rest:
     """State, inlet and outlet openings at rest.
 
     Parameters
@@ -40,7 +40,7 @@ def rest_of(rig: TwinRig, outlets: tuple[float, float], surface: AreaSurface) ->
     return Rest(state, inlets, outlets)
 
 
-def prepared(rig: TwinRig, rest: Rest) -> TwinRig:
+def prepared(rig: RicherRig, rest: Rest) -> RicherRig:
     """The rig with what is adjusted at rest: the cable's length."""
     if rig.frame.cable_stiffness <= 0.0:
         return rig
@@ -48,7 +48,7 @@ def prepared(rig: TwinRig, rest: Rest) -> TwinRig:
     return rig._replace(frame=rig.frame._replace(cable_length=top))
 
 
-def residual(rig: TwinRig, rest: Rest, surface: AreaSurface) -> NDArray[np.float64]:
+def residual(rig: RicherRig, rest: Rest, surface: AreaSurface) -> NDArray[np.float64]:
     """Rates at rest, (SIZE,): zero when the trim is right."""
     rates = np.zeros(SIZE)
     still = (0.0, 0.0)
@@ -58,7 +58,7 @@ def residual(rig: TwinRig, rest: Rest, surface: AreaSurface) -> NDArray[np.float
     return rates
 
 
-def _loads(rig: TwinRig) -> tuple[float, float]:
+def _loads(rig: RicherRig) -> tuple[float, float]:
     a, b = rig.front.arm, -rig.rear.arm
     body, loose = rig.frame.sprung_mass * GRAVITY, rig.frame.loose_mass * GRAVITY
     arm = rig.frame.loose_arm
@@ -76,7 +76,7 @@ def _true_top(axle: float, end: End) -> float:
     return float(brentq(missing, wanted - 0.05, wanted + 0.05, xtol=1e-14))
 
 
-def _pressure(load: float, height: float, end: End, rig: TwinRig, surface: AreaSurface) -> float:
+def _pressure(load: float, height: float, end: End, rig: RicherRig, surface: AreaSurface) -> float:
     frame = rig.frame
 
     def missing(pressure: float) -> float:
@@ -95,7 +95,7 @@ def _pressure(load: float, height: float, end: End, rig: TwinRig, surface: AreaS
     return float(brentq(missing, ambient + 0.1 * PSI, frame.supply_pressure - PSI, xtol=1e-9, rtol=1e-14))
 
 
-def _outflows(core: NDArray[np.float64], outlets: tuple[float, float], rig: TwinRig) -> tuple[float, float]:
+def _outflows(core: NDArray[np.float64], outlets: tuple[float, float], rig: RicherRig) -> tuple[float, float]:
     frame, temperature = rig.frame, rig.frame.supply_temperature
     across = air.exchange(core[8], core[9], temperature, frame)
     flows = []
@@ -107,12 +107,12 @@ def _outflows(core: NDArray[np.float64], outlets: tuple[float, float], rig: Twin
     return flows[0], flows[1]
 
 
-def _supply(flows: tuple[float, float], rig: TwinRig) -> float:
+def _supply(flows: tuple[float, float], rig: RicherRig) -> float:
     frame = rig.frame
     return frame.supply_pressure - (sum(flows) / frame.regulator if frame.tank_volume > 0.0 else 0.0)
 
 
-def _inlets(core: NDArray[np.float64], outlets: tuple[float, float], rig: TwinRig) -> tuple[float, float]:
+def _inlets(core: NDArray[np.float64], outlets: tuple[float, float], rig: RicherRig) -> tuple[float, float]:
     flows = _outflows(core, outlets, rig)
     supply, temperature = _supply(flows, rig), rig.frame.supply_temperature
     found = []
@@ -123,7 +123,7 @@ def _inlets(core: NDArray[np.float64], outlets: tuple[float, float], rig: TwinRi
 
 
 def _fill_flows(
-    state: NDArray[np.float64], inlets: tuple[float, float], outlets: tuple[float, float], rig: TwinRig
+    state: NDArray[np.float64], inlets: tuple[float, float], outlets: tuple[float, float], rig: RicherRig
 ) -> None:
     flows = _outflows(state, outlets, rig)
     state[TANK] = _supply(flows, rig)

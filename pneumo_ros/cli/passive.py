@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.stepping import stepped_rig
-from pneumo_ros.session.passive import passive_twin, road_period
+from pneumo_ros.session.passive import passive_session, road_period
 from pneumo_ros.session.summary import Recorded
 
 
@@ -12,4 +12,4 @@ def passive_run(session: Recorded) -> Recorded | None:
     if len(session.truth) < 2 or len(session.road) < 2:
         return None
     rig = session.rig
-    return passive_twin(session, stepped_rig(rig, road_period(session)) if rig.diagnosed else None)
+    return passive_session(session, stepped_rig(rig, road_period(session)) if rig.diagnosed else None)

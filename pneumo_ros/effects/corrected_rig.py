@@ -1,4 +1,4 @@
-"""The rig as diagnosed, stepped period by period: the twin that sessions, the emulator and the closed loop run.
+"""The rig as diagnosed, stepped period by period: what sessions, the emulator and the closed loop run.
 
 A step is a block of one row through the same hooks and the same kernel that simulate whole logs, with everything that
 an effect remembers (lags, delays, bristles, air masses, a sagging supply) carried in the state. So stepping gives the
@@ -28,7 +28,7 @@ from pneumo_ros.units import GRAVITY
 INSTANT = 1e-7  # s: over so short a step the rates' change is the acceleration, to 1e-8 of g
 
 
-class TwinState(NamedTuple):
+class CorrectedState(NamedTuple):
     """Everything that the next step needs.
 
     Attributes
@@ -53,7 +53,7 @@ class TwinState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TwinRig:
+class CorrectedRig:
     """A rig model that is stepped; implements :class:`pneumo_ros.plant.stepping.SteppedRig`.
 
     Attributes
@@ -86,12 +86,12 @@ class TwinRig:
         terms = self.model.terms(self.active)
         return self.model.switches(terms) if terms else None
 
-    def init(self) -> TwinState:
+    def init(self) -> CorrectedState:
         """At the start; no effect remembers anything."""
         state = trim(self.model.rig).state if self.start is None else self.start
-        return self._seen(TwinState(state, self.model.inner(), np.zeros(2), np.zeros(4), (), (), (), False))
+        return self._seen(CorrectedState(state, self.model.inner(), np.zeros(2), np.zeros(4), (), (), (), False))
 
-    def step(self, state: TwinState, command: Array, road: Array) -> TwinState:
+    def step(self, state: CorrectedState, command: Array, road: Array) -> CorrectedState:
         """One period.
 
         Raises
@@ -109,18 +109,18 @@ class TwinRig:
                 f"the simulated rig ran away: its effects ({self.names}) make it unstable in this session"
             )
         return self._seen(
-            TwinState(plant, inner, heights[-1], acting.commands[0], kept, state.outputs, state.channels, True)
+            CorrectedState(plant, inner, heights[-1], acting.commands[0], kept, state.outputs, state.channels, True)
         )
 
-    def read(self, state: TwinState) -> tuple[float, ...]:
+    def read(self, state: CorrectedState) -> tuple[float, ...]:
         """Through the sensors' effects."""
         return state.channels
 
-    def plant_state(self, state: TwinState) -> Array:
+    def plant_state(self, state: CorrectedState) -> Array:
         """What really moves."""
         return state.plant
 
-    def truth(self, state: TwinState, command: Array, road: Array) -> Array:
+    def truth(self, state: CorrectedState, command: Array, road: Array) -> Array:
         """With the effects' forces in accelerations and tyre forces; the areas are the table's.
 
         Command and road only count before the first step; afterwards it is what acts that acts.
@@ -135,7 +135,7 @@ class TwinRig:
         out[14:16] = _tyre_forces(rates, self.plant)
         return out
 
-    def supply(self, state: TwinState) -> float:
+    def supply(self, state: CorrectedState) -> float:
         """With what an effect takes from it."""
         drop = 0.0
         for one in self.model.terms(self.active):
@@ -145,7 +145,7 @@ class TwinRig:
                 drop += term.supply(tuple(state.inner[k, 0, : term.states]), one.values)
         return self.plant.front.supply_pressure - drop
 
-    def with_supply(self, pressure: float) -> TwinRig:
+    def with_supply(self, pressure: float) -> CorrectedRig:
         """The same effects and values at another supply."""
         rig = self.model.rig.with_values(supply_pressure=pressure)
         references = {
@@ -166,7 +166,7 @@ class TwinRig:
         effects = (*self.model.standing, *self.active)
         return ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in effects) or "no effect"
 
-    def _advanced(self, state: TwinState, command: Array, road: Array, period: float) -> tuple[Array, Array]:
+    def _advanced(self, state: CorrectedState, command: Array, road: Array, period: float) -> tuple[Array, Array]:
         """Plant state and inner states one period of acting inputs later."""
         if self._switches is None:
             return self.car.advance(state.plant, command[0], np.ascontiguousarray(road), period), state.inner
@@ -178,7 +178,7 @@ class TwinRig:
         )  # fmt: skip
         return out[1], inner
 
-    def _seen(self, state: TwinState) -> TwinState:
+    def _seen(self, state: CorrectedState) -> CorrectedState:
         body = self.plant.body
         exact = np.array([read_channels(state.plant, body.front_arm, body.rear_arm)])
         shown, kept = self.model.sensed(exact, self.period, self.active, state.outputs)
@@ -195,16 +195,16 @@ def _tyre_forces(rates: Array, plant: Plant) -> Array:
     return np.asarray(masses * (rates[2:] + GRAVITY) + struts)
 
 
-def diagnosed_rig(rig: Rig, period: float) -> TwinRig:
-    """The twin of a rig whose configuration names effects, or values of an end, ready to step.
+def diagnosed_rig(rig: Rig, period: float) -> CorrectedRig:
+    """A rig whose configuration names effects, or values of an end, ready to step.
 
     Raises
     ------
     InputError
         if its effects are not those of the library.
     """
-    twin = TwinRig(RigModel(rig, library_of(rig), step=DEFAULT_STEP), period)
+    rig_found = CorrectedRig(RigModel(rig, library_of(rig), step=DEFAULT_STEP), period)
     # Compiled code is loaded now, so that the first period is as short as the others.
-    state = twin.step(twin.init(), trim(rig).command, np.zeros((2, 2)))
-    twin.truth(state, trim(rig).command, np.zeros(2))
-    return twin
+    state = rig_found.step(rig_found.init(), trim(rig).command, np.zeros((2, 2)))
+    rig_found.truth(state, trim(rig).command, np.zeros(2))
+    return rig_found

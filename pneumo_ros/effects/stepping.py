@@ -7,7 +7,7 @@ from pneumo_ros.rig import Rig
 
 
 def stepped_rig(rig: Rig, period: float) -> SteppedRig:
-    """The nominal equations, or the twin where the rig's configuration holds what a diagnosis found.
+    """The nominal equations, or the corrected rig where the rig's configuration holds what a diagnosis found.
 
     Raises
     ------

@@ -112,7 +112,7 @@ class Rig:
     """Every number of the scaled half car (Table 3.4, sections 5.6 and 6.3), SI, with tolerances.
 
     ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a
-    simulation with them is the twin of the rig that was diagnosed. Controllers and estimators believe the numbers.
+    simulation with them behaves as the rig that was diagnosed. Controllers and estimators believe the numbers.
     """
 
     name: str

@@ -11,7 +11,7 @@ from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.session.summary import Recorded
 
 
-def passive_twin(session: Recorded, stepped: SteppedRig | None = None) -> Recorded:
+def passive_session(session: Recorded, stepped: SteppedRig | None = None) -> Recorded:
     """The recorded road through the logged rig with passive valves; truth only, at the rate of the log's.
 
     ``stepped`` is the rig with its effects, stepped at the road's period; the nominal equations without it.

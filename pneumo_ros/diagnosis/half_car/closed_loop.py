@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.configured import library_of
-from pneumo_ros.effects.corrected_rig import TwinRig
+from pneumo_ros.effects.corrected_rig import CorrectedRig
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -55,9 +55,12 @@ def rerun_diagnosed(
     )
     noise = np.random.default_rng(seed).standard_normal(signals.measured.shape) * signals.noise_stated
     start = rig_model.initial(signals, active)[0]
-    twin = TwinRig(rig_model, signals.period, nuisance, active, start)
-    channels, commands = close_stepped(twin, stages, signals.road, noise)
-    notes = (f"the rig as diagnosed: {twin.names}", "the run starts from the measured state at the log's first sample")
+    corrected = CorrectedRig(rig_model, signals.period, nuisance, active, start)
+    channels, commands = close_stepped(corrected, stages, signals.road, noise)
+    notes = (
+        f"the rig as diagnosed: {corrected.names}",
+        "the run starts from the measured state at the log's first sample",
+    )
     return Rerun(signals.time, channels, commands, signals.time, signals.measured, notes)
 
 

@@ -3,7 +3,8 @@
 Cheap screening first (:mod:`pneumo_ros.diagnosis.search.screening`), short fits of what promises most, then the best to
 convergence, from several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on
 top of each leading single, where the first effect no longer hides it. Whenever the best fit so far is good enough to
-time the command's jumps by (:mod:`pneumo_ros.diagnosis.fit.command_events`), they are timed and the finalists fitted again.
+time the command's jumps by (:mod:`pneumo_ros.diagnosis.fit.command_events`), they are timed and the finalists fitted
+again.
 """
 
 from __future__ import annotations

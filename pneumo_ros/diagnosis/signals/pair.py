@@ -36,10 +36,10 @@ def check_pair(fit: Sequence[Signals], holdout: Signals | None = None) -> None:
                 remedy="diagnose each rig from its own logs, or give --rig if the configs are known to be wrong",
             )  # fmt: skip
     for k, log in enumerate(fit):
-        twin = next((other for other in fit[:k] if _same_data(other, log)), None)
-        if twin is not None:
+        same = next((other for other in fit[:k] if _same_data(other, log)), None)
+        if same is not None:
             raise InputError(
-                "the same log is given twice", where=f"{twin.name}, {log.name}",
+                "the same log is given twice", where=f"{same.name}, {log.name}",
                 remedy="give each session once: a second copy makes every interval too narrow",
             )  # fmt: skip
     if holdout is not None and any(_same_data(log, holdout) for log in fit):

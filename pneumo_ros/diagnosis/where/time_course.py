@@ -3,8 +3,8 @@
 A force that no function of the motion describes (a rotating imbalance, something that strikes, a law met outside what
 was fitted) defeats every shape of :mod:`pneumo_ros.diagnosis.where.flexible`. What gives its place away is the pattern
 across the equations in one window: a spring's force pushes the body up, turns it and pushes its axle down; a tyre's
-moves one axle only; air moves one balance. So a place may add *any* course in time, one value a window, and the price is what
-that many values take of noise. A sensor's error is a course of the channel, carried through the equations.
+moves one axle only; air moves one balance. So a place may add *any* course in time, one value a window, and the price
+is what that many values take of noise. A sensor's error is a course of the channel, carried through the equations.
 """
 
 from __future__ import annotations

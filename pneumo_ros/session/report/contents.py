@@ -12,7 +12,7 @@ from typing import Any
 from pneumo_ros.log.conformance import Finding, check_conformance
 from pneumo_ros.log.inspection import Event, Report, Setup, TopicReport, inspect_log
 from pneumo_ros.log.reading import Log
-from pneumo_ros.session.passive import passive_twin
+from pneumo_ros.session.passive import passive_session
 from pneumo_ros.session.picture import draw_session
 from pneumo_ros.session.summary import (
     Recorded,
@@ -43,7 +43,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
     report = inspect_log(log)
     session = load_session(log.path)
     if passive is None and not session.rig.diagnosed and len(session.truth) > 1 and len(session.road) > 1:
-        passive = passive_twin(session)
+        passive = passive_session(session)
     ours = summarise(session, loop_timing(log.path), wall_time(log.path))
     theirs = summarise(passive) if passive is not None else None
     findings = check_conformance(log)

@@ -1,0 +1,237 @@
+"""The dashboard in a real browser: loads offline, moves, stops the rig, outlives the session; and who may see it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import pytest
+from helpers import sessions
+from helpers.browser import browser
+from helpers.small_logs import contract_log, write
+
+pytest.importorskip("bokeh")
+from bokeh.util.token import generate_jwt_token, generate_session_id
+from tornado.httpclient import HTTPClientError, HTTPRequest
+from tornado.websocket import WebSocketClosedError, websocket_connect
+
+from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
+from pneumo_ros.dashboard.ring import Ring
+from pneumo_ros.dashboard.server import is_loopback
+from pneumo_ros.dashboard.source import Playback
+from pneumo_ros.log import topics
+from pneumo_ros.log.inspection import read_events
+from pneumo_ros.log.reading import read_log
+from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
+from pneumo_ros.rig import load_rig
+
+pytestmark = pytest.mark.realtime
+
+URL = re.compile(r"http://\S+")
+
+
+@contextmanager
+def served(*arguments: str, module: str = "pneumo_ros.cli.view") -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """The command line's own server; gives the address it prints."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", module, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "COLUMNS": "300"},
+    )  # fmt: skip
+    assert process.stdout is not None
+    try:
+        said = []
+        for line in process.stdout:
+            said.append(line)
+            if found := URL.search(line):
+                yield found.group(), process
+                return
+        raise AssertionError("".join(said))
+    finally:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(20)
+        finally:
+            process.kill()
+
+
+@pytest.fixture(scope="module")
+def log_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("log") / "a.mcap", contract_log(8000))
+
+
+def test_derived_signals() -> None:
+    """A pose put through the geometry comes back; the tyre force is stiffness times squeeze."""
+    rig, time = load_rig(), np.array([0, 10])
+    heave, pitch = np.array([0.02, 0.03]), np.array([0.01, -0.02])
+    points = [heave + rig.front_arm.value * pitch, heave - rig.rear_arm.value * pitch, heave * 0.1, heave * 0.2]
+    found = derive(
+        {
+            topics.DISPLACEMENT.name: Samples(time, topics.DISPLACEMENT.names, np.column_stack(points)),
+            topics.ROAD.name: Samples(time, topics.ROAD.names, np.array([[0.001, 0.002], [0.003, 0.004]])),
+        },
+        rig,
+    )
+    np.testing.assert_allclose(found[MOTION].values, np.column_stack([heave, pitch]), atol=1e-15)
+    assert found[TYRES].values[1, 1] == pytest.approx(14000.0 * (0.004 - 0.006))
+    assert TYRES not in derive({topics.DISPLACEMENT.name: found[topics.DISPLACEMENT.name]}, rig)
+
+
+def test_thinning_keeps_every_peak() -> None:
+    t = np.arange(10_000.0)
+    y = np.zeros_like(t)
+    y[[1234, 7777]] = 5.0, -3.0
+    short_t, short_y = thin(t, y, 600)
+    assert len(short_t) <= 601 and short_y.max() == 5.0 and short_y.min() == -3.0
+    assert np.all(np.diff(short_t) > 0) and short_t[-1] == t[-1]
+    assert short_t[short_y == 5.0] == [1234.0]
+
+
+def test_playback_moves_steps_seeks_and_loops(log_path: Path) -> None:
+    play = Playback(read_log(log_path))
+    shown = lambda: (play.status().now_ns - play.start_ns) * 1e-9  # noqa: E731
+    play.speed = 2.0
+    play.tick(0.5)
+    assert shown() == pytest.approx(1.0)
+    window = play.window(0.1)["/rig/displacement"]
+    assert len(window.time_ns) == 51 and window.time_ns[-1] == play.status().now_ns
+    play.step(0.02)
+    play.tick(1.0)
+    assert shown() == pytest.approx(1.02) and play.status().state == "paused"
+    play.playing = True
+    play.tick(100.0)
+    assert shown() == pytest.approx(15.998) and play.status().state == "paused"
+    play.play(True)  # at the end: from the beginning
+    assert shown() == 0.0 and play.status().state == "playing"
+    play.loop = True
+    play.tick(100.0)
+    assert shown() == 0.0 and play.status().state == "playing"
+    play.seek(-5.0)
+    assert shown() == 0.0
+
+
+def fetch(url: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=20) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def greeted(url: str, origin: str, cookie: str = "") -> bool:
+    """Whether the server opens its web socket to a page of this origin and says hello (Bokeh's ACK)."""
+
+    async def connect() -> bool:
+        headers = {"Origin": origin, **({"Cookie": cookie} if cookie else {})}
+        address = url.replace("http", "ws", 1).rstrip("/") + "/ws"
+        # Bokeh's tokens hold for five minutes from their making, less than the suite takes.
+        token = generate_jwt_token(generate_session_id())
+        socket = await websocket_connect(HTTPRequest(address, headers=headers), subprotocols=["bokeh", token])
+        return await asyncio.wait_for(socket.read_message(), 10) is not None
+
+    try:
+        return asyncio.run(connect())
+    except (HTTPClientError, WebSocketClosedError):
+        return False
+
+
+def test_only_this_computer_and_this_page_or_the_token(log_path: Path) -> None:
+    assert is_loopback("127.0.0.1") and is_loopback("localhost") and not is_loopback("0.0.0.0")
+    with served(str(log_path)) as (url, _):
+        assert url.startswith("http://127.0.0.1:") and "token" not in url and fetch(url) == 200
+        assert greeted(url, url.rstrip("/")) and not greeted(url, "http://evil.example")
+    with served(str(log_path), "--host", "0.0.0.0") as (url, _):
+        bare, token = re.sub(r"//[^:]+:", "//127.0.0.1:", url).split("?token=")
+        assert len(token) >= 24
+        assert fetch(bare) == 403 and fetch(f"{bare}?token=wrong") == 403
+        assert fetch(f"{bare}?token={token}") == 200
+        assert fetch(bare, Cookie=f"pneumo_token={token}") == 200
+        assert not greeted(bare, "http://evil.example") and not greeted(bare, bare.rstrip("/"))
+        assert greeted(bare, bare.rstrip("/"), f"pneumo_token={token}")
+
+
+@pytest.mark.slow
+def test_a_log_plays_in_the_browser(log_path: Path) -> None:
+    with served(str(log_path)) as (url, _), browser() as tab:
+        tab.open(url)
+        tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "plots to be drawn")
+        first = tab.model("position", "value")
+        tab.wait(lambda: tab.model("position", "value") > first + 0.3, "playback to move")
+        tab.click("Play / pause")
+        tab.wait(lambda: "paused" in tab.model("status", "text"), "playback to pause")
+        assert "a.mcap" in tab.driver.title
+
+
+def line_with(words: str, stream: IO[str], seconds: float) -> bool:
+    """Whether a line with these words comes in time."""
+    found = threading.Event()
+
+    def look() -> None:
+        if any(words in line for line in stream):
+            found.set()
+
+    threading.Thread(target=look, daemon=True).start()
+    return found.wait(seconds)
+
+
+@pytest.mark.slow
+def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
+    """One real session: the red button closes the valves, a gain changes, and the page stays when the session ends."""
+    pytest.importorskip("rclpy")
+    path = tmp_path / "session.mcap"
+    domain = str(sessions.own_domain())
+    command = ("run", "--view", "--single-process", "--duration", "300", "--no-picture", "--domain-id", domain,
+               "--output", str(path))  # fmt: skip
+    with served(*command, module="pneumo_ros.cli.main") as (url, process), browser() as tab:
+        tab.open(url)
+        tab.wait(lambda: ">live<" in tab.model("status", "text"), "the session", 60)
+        tab.click("EMERGENCY STOP")
+        tab.wait(lambda: "emergency stop: done" in tab.model("answers", "text"), "the stop to be confirmed")
+        tab.wait(lambda: tab.model("set-controller-pole", "value"), "the gains")
+        tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
+        tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
+        os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)
+        tab.wait(lambda: "nothing heard" in tab.model("status", "text"), "the session's end", 60)
+        tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
+        assert process.poll() is None and process.stdout is not None
+        assert line_with("the dashboard stays", process.stdout, 60.0)
+    log = read_log(path)
+    codes = [event.code for event in read_events(log)]
+    assert "estop" in codes and "parameter_changed" in codes
+    assert_valves_closed(log, next(e.time_ns for e in read_events(log) if e.code == "estop"))
+
+
+def assert_valves_closed(log: object, after_ns: int) -> None:
+    """With closed valves the air's mass stays: P V^n is constant (Eq. 4.22 without flow)."""
+    rig = load_rig()
+    truth = log.joint(topics.TRUTH.name)  # type: ignore[attr-defined]
+    x = truth.position[truth.stamp_ns > after_ns + 100_000_000]
+    assert len(x) > 20
+    heights = x[:, 0] + rig.front_arm.value * x[:, 1] - x[:, 2], x[:, 0] - rig.rear_arm.value * x[:, 1] - x[:, 3]
+    for height, pressure in zip(heights, x[:, 8:10].T, strict=True):
+        air = pressure * (VOLUME_OFFSET + MEAN_AREA * height) ** rig.polytropic_exponent.value
+        assert np.ptp(air) < 1e-3 * air.mean()
+
+
+def test_ring_keeps_the_newest_and_begins_again_when_time_goes_back() -> None:
+    ring = Ring(("a",), capacity=4)
+    for i in range(6):
+        ring.append(10 * i, [float(i)])
+    assert ring.since(0).time_ns.tolist() == [20, 30, 40, 50]
+    assert ring.since(35).values[:, 0].tolist() == [4.0, 5.0]
+    ring.append(45, [9.0])  # a little late: sorted in
+    assert ring.since(0).time_ns.tolist() == [30, 40, 45, 50]
+    assert ring.since(45).values[:, 0].tolist() == [9.0, 5.0]
+    ring.append(-(10**9) - 1, [7.0])
+    assert ring.since(-(10**10)).values[:, 0].tolist() == [7.0]

@@ -1,0 +1,49 @@
+"""The layouts for other viewers are up to date and name what a session really records."""
+
+from __future__ import annotations
+
+import json
+import re
+from xml.etree import ElementTree
+
+import pytest
+from helpers.folders import CONFIG
+
+from pneumo_ros.dashboard.viewer_layouts import LAYOUTS, recorded_panels
+from pneumo_ros.log import topics
+
+FOLDER = CONFIG / "layouts"
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_the_committed_file_is_what_the_table_makes(name: str) -> None:
+    assert (FOLDER / name).read_text() == LAYOUTS[name]()
+
+
+def leaves(node: object) -> list[str]:
+    return [node] if isinstance(node, str) else [*leaves(node["first"]), *leaves(node["second"])]  # type: ignore[index]
+
+
+def test_foxglove_paths_point_at_the_named_channel() -> None:
+    layout = json.loads(LAYOUTS["foxglove.json"]())
+    assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+    for panel, plot in zip(recorded_panels(), layout["configById"].values(), strict=True):
+        for line, path in zip(panel.lines, plot["paths"], strict=True):
+            topic = topics.BY_NAME[line.source]
+            found = re.fullmatch(r"(/[\w/]+)\.(\w+)(?:\[(\d+)\])?", path["value"])
+            assert found is not None and found[1] == topic.name and topic.recorded
+            assert (topic.names[int(found[3])] if found[3] else found[2]) == line.channel
+
+
+def test_plotjuggler_curves_name_recorded_channels() -> None:
+    root = ElementTree.fromstring(LAYOUTS["plotjuggler.xml"]().encode())
+    curves = [curve.get("name", "") for curve in root.iter("curve")]
+    assert len(curves) == sum(len(panel.lines) for panel in recorded_panels()) > 20
+    known = {
+        f"{topic.name}/{name}" + ("/position" if topic.type == topics.JOINT else "")
+        for topic in topics.TOPICS
+        for name in topic.names
+    }
+    assert set(curves) <= known
+    for splitter in root.iter("DockSplitter"):
+        assert int(splitter.get("count", "0")) == len(splitter) == len(splitter.get("sizes", "").split(";"))

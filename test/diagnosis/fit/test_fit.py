@@ -1,0 +1,227 @@
+"""Fit, screening, competition and verdict on the model's own data, where the truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.rig_logs import excitation, signals_of, simulated
+
+from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.fit.command_events import timed
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit, sensitivities
+from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
+from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
+from pneumo_ros.diagnosis.search.competition import Effort, starts_elsewhere
+from pneumo_ros.diagnosis.search.screening import all_parts, promises, trials, visibility
+from pneumo_ros.diagnosis.signals import Signals
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.plant.trim import trim
+from pneumo_ros.rig import load_rig
+
+QUICK = Effort(singles=5, finalists=3, seconds=(2,), blind_pairs=1, pair_finalists=2)
+
+
+@pytest.fixture(scope="module")
+def model() -> RigModel:
+    return RigModel(load_rig())
+
+
+def drawn(model: RigModel, seed: int, spread: float = 1.0) -> np.ndarray:
+    """Nuisance values inside the tolerances."""
+    rng = np.random.default_rng(seed)
+    sigmas = np.clip(rng.normal(size=len(model.parameters)), -2.0, 2.0) * spread
+    return np.array([p.nominal + p.std * s for p, s in zip(model.parameters, sigmas, strict=True)])
+
+
+def log(model: RigModel, seed: int, nuisance: np.ndarray | None = None, active: tuple[Active, ...] = ()) -> Signals:
+    """A log of the model itself, from rest at the nominal trim, with sensor noise."""
+    road, commands = excitation(6.0, seed)
+    inputs = driven(road, commands)
+    clean = model.simulate(inputs, nuisance, trim(model.rig).state, active)
+    return signals_of(clean, road, commands, seed, f"log-{seed}")
+
+
+def driven(road: np.ndarray, commands: np.ndarray) -> Signals:
+    """Inputs alone, the sensors still at rest."""
+    return signals_of(np.tile(simulated(0.1, 1)[0][0], (len(road), 1)), road, commands)
+
+
+def test_refit_gives_back_what_the_log_was_made_with(model: RigModel) -> None:
+    truth = drawn(model, 3)
+    record, held = log(model, 1, truth), log(model, 2, truth)
+    problem = Problem(model, (record,))
+    start = problem.start(Candidate(), None, ())
+    found = fit(problem, Candidate(), start, iterations=12)
+    nominal = np.array([p.nominal for p in model.parameters])
+    before, after = (total_gap(channel_gaps(held, free_run(model, held, n, ())))
+                     for n in (nominal, problem.nuisance(found.x)))  # fmt: skip
+    assert after < 0.01 < 0.1 < before
+    found = sensitivities(problem, found)
+    estimates = nuisance_estimates(problem, found, covariance(problem, found))
+    off = [(estimates[p.name].value - t) / max(estimates[p.name].std, 1e-3 * p.std)
+           for p, t in zip(model.parameters, truth, strict=True)]  # fmt: skip
+    assert np.sqrt(np.mean(np.square(off))) < 2.5
+
+
+def test_bounded_newton_stays_inside_and_is_optimal() -> None:
+    rng = np.random.default_rng(0)
+    A = rng.normal(size=(30, 6))
+    H, g = A.T @ A, rng.normal(size=6) * 30.0
+    low, high = np.full(6, -0.3), np.full(6, 0.3)
+    move = bounded_newton(H, g, low, high)
+    gradient = H @ move + g
+    inside = (move > low + 1e-9) & (move < high - 1e-9)
+    assert np.all(move >= low) and np.all(move <= high) and (~inside).any()
+    assert np.max(np.abs(gradient[inside]), initial=0.0) < 1e-8
+    assert np.all(gradient[move >= high - 1e-9] < 1e-8) and np.all(gradient[move <= low + 1e-9] > -1e-8)
+
+
+def test_screening_ranks_the_true_effect_first(model: RigModel) -> None:
+    record = log(model, 1, drawn(model, 4, 0.5), (Active("valve_lag", "rear", (0.02, 0.8)),))
+    problem = Problem(model, (record,))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
+    ranked = promises(problem, refit, trials(problem, refit, all_parts(problem)))
+    assert (("valve_lag", "rear"),) in [p.parts for p in ranked[:2]] and ranked[0].share > 0.8
+
+
+def test_a_candidate_that_runs_away_loses_and_does_not_raise(model: RigModel) -> None:
+    problem = Problem(model, (log(model, 1),))
+    wild = Candidate((("effective_area_error", "both"),))
+    start = problem.start(wild, None, (-0.4, -1.5))
+    assert np.isinf(fit(problem, wild, start, iterations=1).cost) or fit(problem, wild, start, iterations=1).cost > 0
+
+
+def test_jumps_between_samples_are_timed(model: RigModel) -> None:
+    """Commands that really jumped half a sample before the row that shows them."""
+    road, commands = excitation(6.0, 1)
+    steps = np.repeat(np.random.default_rng(5).uniform(0.75, 1.25, (12, 2)), 250, axis=0)
+    commands[:, :2] = trim(model.rig).command[:2] * steps
+    inputs = driven(road, commands)
+    events = model.events(inputs)
+    assert len(events) == 22
+    lead = np.random.default_rng(6).choice([0.0, 0.5], len(events))
+    truth = model.led(inputs, events, lead)
+    clean = model.simulate(truth, initial=trim(model.rig).state)
+    problem = Problem(model, (signals_of(clean, road, commands, 1),))
+    best = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
+    moved = timed(problem, problem, best)
+    assert moved is not problem
+    again = fit(moved, Candidate(), best.x, best.jacobian)
+    assert np.mean(again.residual**2) < 0.5 * np.mean(best.residual**2)
+
+
+def test_jumps_that_a_wrong_structure_misplaced_are_put_back(model: RigModel) -> None:
+    """Jumps exactly where the log has them; a first timing has put some of them a sample early."""
+    road, commands = excitation(6.0, 1)
+    steps = np.repeat(np.random.default_rng(5).uniform(0.75, 1.25, (12, 2)), 250, axis=0)
+    commands[:, :2] = trim(model.rig).command[:2] * steps
+    inputs = driven(road, commands)
+    logged = Problem(model, (signals_of(model.simulate(inputs, initial=trim(model.rig).state), road, commands, 1),))
+    events = model.events(logged.records[0])
+    lead = np.random.default_rng(6).choice([0.0, 1.0], len(events))
+    wrong = Problem(model, (model.led(logged.records[0], events, lead),))
+    best = fit(wrong, Candidate(), wrong.start(Candidate(), None, ()), iterations=6)
+    again = timed(logged, wrong, best)
+    assert again is not wrong
+    left, before = (np.sqrt(np.mean((p.records[0].commands - logged.records[0].commands) ** 2)) for p in (again, wrong))
+    assert left < 0.4 * before
+
+
+def test_a_channel_at_half_the_rate_counts_where_it_was_sampled(model: RigModel) -> None:
+    record = log(model, 1)
+    weight = record.weight.copy()
+    weight[1::2, 4:] = 0.0
+    measured = record.measured.copy()
+    measured[1::2, 4:] += 1e4  # whatever fills the rows without a sample must not count
+    slower = Problem(model, (replace(record, measured=measured, weight=weight),))
+    whole = Problem(model, (record,))
+    assert (slower.weight[:, 4:] > 0.0).all() and np.allclose(slower.weight[:, :4], whole.weight[:, :4])
+    assert (slower.weight[:, 4:] < whole.weight[:, 4:]).all()  # fewer samples, more noise
+    start = whole.start(Candidate(), None, ())
+    here, there = (p.residual(Candidate(), start)[:, 4:] for p in (slower, whole))
+    assert np.sqrt(np.mean(here**2)) == pytest.approx(np.sqrt(np.mean(there**2)), rel=0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("truth", "verdict", "side", "place"),
+    [
+        ((), "none", None, None),
+        ((Active("leak", "front", (3e-7, 0.0)),), "leak", "front", "front_air"),
+        ((Active("lvdt_scale", "sprung_rear", (0.03,)),), "lvdt_scale", None, "sensor:sprung_rear"),
+    ],
+)
+def test_verdict_side_and_place(
+    model: RigModel, truth: tuple[Active, ...], verdict: str, side: str | None, place: str | None
+) -> None:
+    nuisance = drawn(model, 8)
+    found = diagnose(model, [log(model, 1, nuisance, truth)], log(model, 2, nuisance, truth), Options(effort=QUICK))
+    assert found.verdict == verdict
+    assert found.location == () if place is None else found.location[0][0] == place
+    assert found.probability > 0.3
+    if truth:
+        best = next(r for r in found.ranking if r.effects == (truth[0].effect,))
+        assert best.side == side and best.shrink > 0.8
+        assert best.shrink_ci90[0] <= best.shrink <= best.shrink_ci90[1]
+        assert found.gap.best < found.gap.refit < found.gap.nominal
+        estimate = next(iter(best.parameters.values()))
+        assert abs(estimate.value - truth[0].values[0]) < 3.0 * estimate.std + 0.02 * abs(estimate.value)
+
+
+def test_what_is_withheld_does_not_compete(model: RigModel) -> None:
+    without = replace(model, withheld=frozenset({"leak"}))
+    assert "leak" not in without.effects and "leak" in without.library
+    problem = Problem(without, (log(model, 1),))
+    assert all(effect != "leak" for effect, _ in all_parts(problem))
+
+
+def test_bootstrap_interval_holds_the_shrink(model: RigModel) -> None:
+    record = log(model, 1)
+    rng = np.random.default_rng(2)
+    error = rng.normal(size=record.measured.shape) * record.scale
+    refit, best = record.measured + error, record.measured + 0.25 * error
+    low, high = bootstrap_shrink(record, refit, best)
+    assert low <= 0.75 <= high and high - low < 0.05
+
+
+def test_a_rig_at_rest_shows_hardly_any_effect(model: RigModel) -> None:
+    road, commands = np.zeros((1500, 2)), np.tile(trim(model.rig).command, (1500, 1))
+    clean = model.simulate(driven(road, commands), initial=trim(model.rig).state)
+    problem = Problem(model, (signals_of(clean, road, commands, 3),))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=2)
+    still = visibility(problem, refit, trials(problem, refit, all_parts(problem)))
+    problem = Problem(model, (log(model, 1),))
+    refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=2)
+    driven_rig = visibility(problem, refit, trials(problem, refit, all_parts(problem)))
+    for effect in ("coulomb_friction", "valve_lag", "tyre_damping", "exciter_lag", "pressure_lag", "bump_stop"):
+        assert still[effect] < 0.5
+    for effect in ("coulomb_friction", "valve_lag", "tyre_damping", "leak", "supply_droop"):
+        assert driven_rig[effect] > 1.0
+
+
+def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
+    """A slope that is too steep, with an error of the wrong sign, fits an orifice well enough to be stuck there."""
+    orifice = model.effects["orifice_coefficient"].parameters
+    tried = starts_elsewhere(orifice, np.array([-0.0145, 1.65, 1.2]))
+    assert tried == [[0.08, 0.5, 0.5], [-0.0145, -0.5, 1.2], [-0.0145, 1.65, 0.0]]
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "walls"),
+    [
+        ("bump_stop", (2e4, 0.004, 0.0, 0.0), 0),  # a stop without hardening or loss
+        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 2),
+        ("bellows_mode", (0.2, 12.0, 0.08, 1.0), 0),  # all of the damping is the wall's own
+        ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 2),
+    ],
+)
+def test_natural_ends_of_a_law_are_no_walls(
+    model: RigModel, effect: str, values: tuple[float, ...], walls: int
+) -> None:
+    problem, candidate = Problem(model, (log(model, 1),)), Candidate(((effect, "front"),))
+    x = problem.start(candidate, None, values)
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == walls

@@ -1,0 +1,1 @@
+"""What several tests share: small logs, simulated and serial rigs, sessions of their own domain, a browser."""

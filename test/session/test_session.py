@@ -1,0 +1,172 @@
+"""Whole sessions over real DDS: complete, repeatable, readable, and honest when something dies."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+import yaml
+from helpers import sessions
+from mcap_ros2.reader import read_ros2_messages
+from rosbags.highlevel import AnyReader
+
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import read_log
+
+DURATION = 3.0
+SAMPLES = 1501
+PERIOD_NS = 2_000_000
+
+
+@pytest.fixture(scope="module")
+def processes_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("processes") / "session.mcap"
+    code, said = sessions.run("--duration", str(DURATION), "--seed", "5", "--output", str(path))
+    assert code == 0, said
+    assert "heave accel." in said
+    return path
+
+
+@pytest.fixture(scope="module")
+def single_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("single") / "session.mcap"
+    code, said = sessions.run(
+        "--duration", str(DURATION), "--seed", "5", "--output", str(path), "--single-process", "--no-picture"
+    )
+    assert code == 0, said
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["processes_log", "single_log"])
+def test_no_message_is_lost_and_stamps_increase(which: str, request: pytest.FixtureRequest) -> None:
+    log = read_log(request.getfixturevalue(which))
+    for topic in topics.EVERY_PERIOD:
+        records = log.pressure(topic.name) if topic.type == topics.PRESSURE else log.joint(topic.name)
+        steps = np.diff(records.stamp_ns)
+        assert len(steps) >= SAMPLES - 1, topic.name
+        assert np.all(steps == PERIOD_NS), topic.name
+    assert log.config is not None and log.config.name == "half-car-2m2a"
+    assert log.topics["/rig/setup"].count >= 5
+
+
+@pytest.mark.slow
+def test_other_readers_take_the_log(processes_log: Path) -> None:
+    with AnyReader([processes_log]) as reader:
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        assert counts["/rig/displacement"] == SAMPLES
+        assert sum(1 for _ in reader.messages()) == reader.message_count
+    with AnyReader([processes_log.parent]) as bag:  # through metadata.yaml
+        assert bag.message_count == sum(counts.values())
+    theirs = sum(1 for m in read_ros2_messages(str(processes_log)) if m.channel.topic == "/valve/command")
+    assert theirs == SAMPLES
+
+
+@pytest.mark.slow
+def test_channels_carry_qos_and_type_hash(processes_log: Path) -> None:
+    info = read_log(processes_log).topics["/rig/displacement"]
+    assert info.type_hash.startswith("RIHS01_")
+    assert yaml.safe_load(info.qos)[0]["reliability"] == "reliable"
+
+
+@pytest.mark.slow
+def test_metadata_explains_the_run(processes_log: Path) -> None:
+    records = {m.name: m.metadata for m in read_log(processes_log).metadata}
+    assert records["session"]["complete"] == "true"
+    assert records["pneumo_ros"]["seed"] == "5" and "numpy" in records["versions"]
+    assert "rosbag2" in records
+    setups = [yaml.safe_load(text) for text in read_log(processes_log).texts("/rig/setup")]
+    assert any(s.get("road", {}).get("seed") == 5 for s in setups)
+
+
+@pytest.mark.slow
+def test_same_seed_gives_equal_bytes_whatever_the_processes(processes_log: Path, single_log: Path) -> None:
+    one, two = read_log(processes_log), read_log(single_log)
+    for topic in (*topics.MEASUREMENTS, topics.COMMAND, topics.ESTIMATE, topics.TRUTH):
+        np.testing.assert_array_equal(one.records(topic.name).data, two.records(topic.name).data, topic.name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("victim", ["controller", "estimator", "plant", "road_profile"])
+def test_killing_a_node_leaves_a_readable_log(tmp_path: Path, victim: str) -> None:
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture")
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    sessions.kill(sessions.children(process.pid)[victim])
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert victim in said and "SIGKILL" in said
+    log = read_log(path)
+    assert log.topics["/rig/displacement"].count > 100
+    records = {m.name: m.metadata for m in log.metadata}
+    assert records["session"]["complete"] == "false" and victim in records["session"]["reason"]
+
+
+@pytest.mark.slow
+def test_killing_the_recorder_leaves_a_readable_log_that_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture")
+    part = path.with_name("session.mcap.part")
+    sessions.wait_for(process, part, 600_000)
+    sessions.kill(sessions.children(process.pid)["session_recorder"])
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode != 0 and "session_recorder" in said
+    assert not path.exists(), "a log that was cut off must not look complete"
+    recovered = path.with_name("session.recovered.mcap")
+    assert str(recovered) in "".join(said.split())
+    assert read_log(recovered).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
+def test_interrupt_finishes_the_log(tmp_path: Path) -> None:
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture")
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    process.send_signal(2)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, said
+    assert read_log(path).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
+def test_nodes_end_when_their_supervisor_is_killed(tmp_path: Path) -> None:
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture")
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 200_000)
+    nodes = sessions.children(process.pid).values()
+    sessions.kill(process.pid)
+    process.communicate(timeout=60)
+    end = time.monotonic() + 30.0
+    while any(Path(f"/proc/{pid}").exists() for pid in nodes):
+        assert time.monotonic() < end, "nodes live on without their supervisor"
+        time.sleep(0.1)
+    assert read_log(path).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
+@pytest.mark.realtime
+def test_real_time_session_keeps_the_clock_and_takes_live_gains(tmp_path: Path) -> None:
+    """Gains change while it runs and the change is logged; a bad one is refused; missed periods are counted."""
+    path = tmp_path / "session.mcap"
+    domain = sessions.own_domain()
+    process = sessions.start("--realtime", "--duration", "6", "--output", str(path), domain=domain)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 100_000)
+    assert sessions.set_parameter(domain, "controller", "pole", 14.0) == ""
+    assert "out of range" in sessions.set_parameter(domain, "controller", "pole", 1e9)
+    assert sessions.set_parameter(domain, "controller", "controller", "passive") != "", "read-only"
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, said
+    log = read_log(path)
+    setups = [yaml.safe_load(text) for text in log.texts("/rig/setup")]
+    poles = [s["parameters"]["pole"] for s in setups if s["node"] == "controller"]
+    assert poles == [10.0, 14.0]
+    stamps = log.joint("/rig/displacement").stamp_ns
+    assert np.all(np.diff(stamps) > 0) and np.all(np.diff(stamps) % PERIOD_NS == 0), "skipped whole periods only"
+    assert (stamps[-1] - stamps[0]) * 1e-9 == pytest.approx(6.0, abs=0.5)
+    last = [s for _, m in log.messages("/diagnostics") for s in m.status if s.name == "plant: loop"][-1]
+    values = {v.key: v.value for v in last.values}
+    assert int(values["missed periods"]) >= 0 and float(values["period p50 (us)"]) > 1000.0
