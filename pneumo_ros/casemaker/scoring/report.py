@@ -68,7 +68,7 @@ LINES: tuple[Line, ...] = (
 
 HEAD = """# The blind check: results
 
-Cases are made by a richer rig (`casemaker/`), written apart from the library of the diagnosis: neither imports the other.
+Cases are made by a richer rig (`casemaker/`), written apart from the diagnosis: neither imports the other.
 Every label is sealed by a salted SHA-256 in the set's manifest before the diagnosis runs; seals are checked when the
 answers are opened. How:
 
