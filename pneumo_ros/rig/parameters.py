@@ -63,6 +63,9 @@ LIMITS: dict[str, Limit] = {
     "discharge_coefficient": Limit("1", 0.05, 2.0, "factor on every orifice area"),
     "displacement_noise": Limit("m", 0.0, 0.01, "standard deviation of white LVDT noise"),
     "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
+    "model_form": Limit(
+        "1", 0.0, 0.5, "share of each channel's std below which a difference is no effect to its maker"
+    ),
 }
 
 # What an end may have of its own where the rig has one number for both, or where the command is not what happens.
@@ -138,6 +141,7 @@ class Rig:
     discharge_coefficient: Quantity
     displacement_noise: Quantity
     pressure_noise: Quantity
+    model_form: Quantity = Quantity(0.0, 0.0, "1")
     ends: tuple[tuple[str, float], ...] = ()
     effects: tuple[NamedEffect, ...] = ()
 
@@ -179,6 +183,8 @@ class Rig:
         out: dict[str, Any] = {"name": self.name}
         for name in LIMITS:
             q: Quantity = getattr(self, name)
+            if name == "model_form" and q.value == 0.0:
+                continue  # absent means zero, as in the logs of others
             out[name] = {"value": q.value, "std": q.std, "unit": q.unit}
         return out
 
@@ -223,7 +229,8 @@ def parse_rig(text: str, where: str = "rig") -> Rig:
         raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
     if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
         raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
-    rig = _from_mapping(document["rig"], where)
+    own = {key: document[key] for key in ("model_form",) if key in document}  # some write it beside the rig's numbers
+    rig = _from_mapping({**own, **document["rig"]}, where)
     return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
 
 
@@ -278,7 +285,8 @@ def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
     for key in entries:
         if key not in known:
             _limit_of(str(key), where)
-    base = {} if set(known) <= set(entries) else _nominal_entries()
+    base = {"model_form": {"value": 0.0, "unit": "1"}}
+    base |= {} if known - set(base) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
     return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
