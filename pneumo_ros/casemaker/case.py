@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.casemaker.catalogue import Applied, get
+from pneumo_ros.casemaker.catalogue import get
 from pneumo_ros.casemaker.draw import drawn_rig, imperfect_rig, scenes
 from pneumo_ros.casemaker.gap_size import NUISANCE, Null, null_of, quick_gap, refit
 from pneumo_ros.casemaker.log_file import write_log
 from pneumo_ros.casemaker.parameters import RicherRig
 from pneumo_ros.casemaker.plan import Planned
+from pneumo_ros.casemaker.registry import Applied
 from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from pneumo_ros.casemaker.laws.ground import lift, tyre_loss
+from pneumo_ros.casemaker.laws.slots import FORM, LIFTOFF, TYRE_LOSS
 from pneumo_ros.casemaker.parameters import End
 
 
@@ -48,6 +52,34 @@ def hunt_crossley(height: float, speed: float, end: End) -> float:
     if end.contact_stiffness <= 0.0 or depth <= 0.0:
         return 0.0
     return max(0.0, end.contact_stiffness * depth**1.5 * (1.0 - end.contact_damping * speed))
+
+
+@njit(cache=True)
+def elastic_tyre(deflection: float, static: float, rows: NDArray[np.float64], end: End) -> float:
+    """Force without losses, N; a second law of lift-off agrees with the linear tyre at rest."""
+    if rows[LIFTOFF, 0] > 0.0:
+        return end.tyre_stiffness * static * lift(rows[LIFTOFF], deflection / static)
+    about = deflection - static
+    force = end.tyre_stiffness * (deflection + end.tyre_hardening * about**3)
+    if rows[FORM, 0] > 0.0:
+        force += rows[FORM, 6] * end.tyre_stiffness * about * about / static
+    return force
+
+
+@njit(cache=True)
+def lossy_tyre(
+    x: NDArray[np.float64], dx: NDArray[np.float64], at: int, deflection: float, rate: float, static: float,
+    rows: NDArray[np.float64], end: End,
+) -> float:  # fmt: skip
+    """Tyre force with second laws, N upwards on the axle; fills the rate of its memory."""
+    force = elastic_tyre(deflection, static, rows, end) + end.tyre_damping * rate
+    if rows[TYRE_LOSS, 0] > 0.0:
+        force += tyre_loss(rows[TYRE_LOSS], x, dx, at, rate, deflection / static)
+    if rows[LIFTOFF, 0] > 0.0:
+        return 0.0 if deflection <= 0.0 and rows[LIFTOFF, 0] == 1.0 else max(0.0, force)
+    if end.unilateral <= 0.0:
+        return force
+    return 0.0 if deflection <= 0.0 else max(0.0, force)
 
 
 @njit(cache=True)

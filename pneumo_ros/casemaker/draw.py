@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pneumo_ros.casemaker.catalogue import at_ends
+from pneumo_ros.casemaker.registry import at_ends
 from pneumo_ros.casemaker.excitation import ROADS
 from pneumo_ros.casemaker.parameters import RicherRig, richer_rig
 from pneumo_ros.casemaker.scene import Scene

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.casemaker.catalogue import QUICKEST, Applied, at_ends, effect, in_frame, places_of, sign
 from pneumo_ros.casemaker.parameters import RicherRig
+from pneumo_ros.casemaker.registry import QUICKEST, Applied, at_ends, effect, in_frame, places_of, sign
 
 Rng = np.random.Generator
 
 
-@effect("coulomb_friction")
+@effect("coulomb_friction", law="lugre")
 def coulomb_friction(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """LuGre: up to 20 N of slip friction, 1.1 to 1.35 of it at rest, giving way at 0.15 to 0.4 mm."""
     level, stick = 20.0 * size, rng.uniform(1.1, 1.35)
@@ -22,7 +22,7 @@ def coulomb_friction(rig: RicherRig, size: float, side: str | None, rng: Rng) ->
                    places_of(side, "force"))  # fmt: skip
 
 
-@effect("viscous_damping")
+@effect("viscous_damping", law="linear_and_quadratic")
 def viscous_damping(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Damping beyond its tolerance, up to 150 N s/m, part of it growing with speed."""
     extra, share = 150.0 * size, rng.uniform(0.0, 0.3)
@@ -30,7 +30,7 @@ def viscous_damping(rig: RicherRig, size: float, side: str | None, rng: Rng) -> 
     return Applied(changed, {"damping": (extra, "N s/m")}, places_of(side, "force"))
 
 
-@effect("bellows_hysteresis")
+@effect("bellows_hysteresis", law="bouc_wen")
 def bellows_hysteresis(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Bouc-Wen: up to 12 N/mm that slips at 0.8 to 2 mm."""
     stiffness, give, power = 12e3 * size, rng.uniform(0.8e-3, 2e-3), rng.uniform(1.0, 2.0)
@@ -39,7 +39,7 @@ def bellows_hysteresis(rig: RicherRig, size: float, side: str | None, rng: Rng) 
                    places_of(side, "force"))  # fmt: skip
 
 
-@effect("bellows_mode")
+@effect("bellows_mode", law="linear")
 def bellows_mode(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A mass of the bellows' wall that swings at 8 to 16 Hz inside the spring, up to 0.6 kg."""
     frequency, mass, ratio = 2.0 * np.pi * rng.uniform(8.0, 16.0), 0.6 * size, rng.uniform(0.04, 0.12)
@@ -48,21 +48,21 @@ def bellows_mode(rig: RicherRig, size: float, side: str | None, rng: Rng) -> App
                    places_of(side, "force"))  # fmt: skip
 
 
-@effect("tyre_damping", comparable=True)
+@effect("tyre_damping", law="viscous", comparable=True)
 def tyre_damping(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Viscous, up to 80 N s/m, on the difference between road and axle speed."""
     return Applied(at_ends(rig, side, tyre_damping=80.0 * size), {"tyre_damping": (80.0 * size, "N s/m")},
                    places_of(side, "tyre"))  # fmt: skip
 
 
-@effect("tyre_liftoff")
+@effect("tyre_liftoff", law="no_pull")
 def tyre_liftoff(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The tyre cannot pull; seen once the road is rough enough: heights up to 3 times the usual ones."""
     gain = 1.0 + 2.0 * size
     return Applied(at_ends(rig, side, unilateral=1.0), {"road_gain": (gain, "1")}, places_of(side, "tyre"), gain)
 
 
-@effect("bump_stop")
+@effect("bump_stop", law="hunt_crossley", foreign=True)
 def bump_stop(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """A rubber stop (Hunt-Crossley) that is met up to 13 mm above where the nominal one is."""
     above, stiffness = 13e-3 * size, rng.uniform(3e5, 1.2e6)
@@ -71,7 +71,7 @@ def bump_stop(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applie
     return Applied(changed, {"contact_height": (rig.frame.stop_height + above, "m")}, places_of(side, "force"))
 
 
-@effect("payload", sides=(None,), comparable=True)
+@effect("payload", law="point_mass", sides=(None,), comparable=True)
 def payload(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Up to 8 kg on the centre of mass that the rig file does not know of."""
     mass = 8.0 * size
@@ -79,7 +79,7 @@ def payload(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
                    ("body_heave",))  # fmt: skip
 
 
-@effect("cg_shift", sides=(None,), comparable=True)
+@effect("cg_shift", law="shift", sides=(None,), comparable=True)
 def cg_shift(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """Centre of mass up to 40 mm forward or backward of where the rig file has it."""
     shift = 0.04 * size * sign(rng)
@@ -88,7 +88,7 @@ def cg_shift(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied
     return Applied(changed, {"shift_forward": (shift, "m")}, ("body_pitch", "body_heave"))
 
 
-@effect("exciter_lag", comparable=True)
+@effect("exciter_lag", law="second_order", comparable=True)
 def exciter_lag(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
     """The hydraulic exciter follows its command as a second order system, up to 25 ms late."""
     late, ratio = max(0.025 * size, QUICKEST), rng.uniform(0.7, 1.0)

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from pneumo_ros.casemaker.laws.slots import Law, table
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT, BUMP_STOP_STIFFNESS
 from pneumo_ros.rig import LIMITS, Rig
@@ -126,11 +130,17 @@ class Frame(NamedTuple):
 
 
 class RicherRig(NamedTuple):
-    """A rig ready to simulate."""
+    """A rig ready to simulate; ``laws`` are its second laws, at most one of a family at an end."""
 
     frame: Frame
     front: End
     rear: End
+    laws: tuple[Law, ...] = ()
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """The second laws as the compiled rig takes them, (2, ROWS, COLUMNS)."""
+        return table(self.laws)
 
 
 def richer_rig(rig: Rig, reference_pressures: tuple[float, float]) -> RicherRig:

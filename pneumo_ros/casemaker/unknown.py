@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.casemaker.catalogue import Applied, at_ends, effect, in_frame, places_of, sign
 from pneumo_ros.casemaker.known_air import NOMINAL_OPENING
 from pneumo_ros.casemaker.parameters import RicherRig
+from pneumo_ros.casemaker.registry import Applied, at_ends, effect, in_frame, places_of, sign
 
 Rng = np.random.Generator
 ENDS = ("front", "rear")

@@ -10,12 +10,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pneumo_ros.casemaker.laws.ground import late
 from pneumo_ros.casemaker.parameters import End
 
 
 @njit(cache=True)
-def delayed(commands: NDArray[np.float64], time: float, delay: float, period: float) -> float:
+def delayed(commands: NDArray[np.float64], time: float, law: NDArray[np.float64], delay: float, period: float) -> float:
     """Command in force at ``time - delay``, m2; commands are held over a period, and the first one before the run."""
+    if law[0] > 0.0:
+        delay = late(law, time, period)
     index = int(np.floor((time - delay) / period + 1e-9))
     return commands[min(max(index, 0), commands.shape[0] - 1)]
 
