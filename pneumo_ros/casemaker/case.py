@@ -14,23 +14,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.casemaker.budget import budget_of, true_logs
 from pneumo_ros.casemaker.catalogue import get
+from pneumo_ros.casemaker.curves import curve_of
 from pneumo_ros.casemaker.draw import drawn_rig, imperfect_rig, scenes
-from pneumo_ros.casemaker.gap_size import NUISANCE, Null, null_of, quick_gap, refit
+from pneumo_ros.casemaker.form import STATED, drawn_form, sized_form
+from pneumo_ros.casemaker.gap_size import NUISANCE, Null, Observation, null_of, quick_gap, refit
 from pneumo_ros.casemaker.log_file import write_log
 from pneumo_ros.casemaker.parameters import RicherRig
 from pneumo_ros.casemaker.plan import Planned
+from pneumo_ros.casemaker.refit import bounded_gap
 from pneumo_ros.casemaker.registry import Applied
 from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
+from pneumo_ros.casemaker.trim import NoRestError
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
-from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.rig import Quantity, Rig, load_rig
 
 Logs = NDArray[np.float64]
 LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
 GRADE_TOLERANCE = 0.04  # relative
 QUICK_TRIES, CAREFUL_TRIES = 5, 9
+ROUGH_TRIES = 2  # of several effects together: their shares are measured anyway
 DRAWS, ACTS = 4, 0.5  # draws at most; share of the grade that each effect must reach alone
 RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
 
@@ -58,7 +64,8 @@ class Graded:
     size: float
     gap: float
     ratio: float
-    weakest: float  # ratio of the weakest of its effects alone
+    weakest: float  # smallest ratio of one of its effects alone to its grade
+    sizes: tuple[float, ...]
     applied: tuple[Applied, ...]
 
 
@@ -92,7 +99,12 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
     runs away, is drawn anew: a label must not name what is not there.
     """
     for draw in range(DRAWS):
-        label, sessions, configs = _drawn(case, draw, on)
+        try:
+            label, sessions, configs = _drawn(case, draw, on)
+        except NoRestError:
+            if draw == DRAWS - 1:
+                raise
+            continue
         if label["weakest"] >= ACTS * case.grade and all(np.isfinite(one.sensors).all() for one in sessions):
             break
     return label, sessions, configs
@@ -105,6 +117,10 @@ def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Se
     fit, held, edit = (_rideable(scene, real, on) for scene in scenes(rng, case.imperfect))
     effect_seed = int(rng.integers(1, 2**31))
     null = null_of(on.car, observation(play(real, on.nominal, fit, on.car.surface), on.nominal))
+    stated, form_error = 0.0, 0.0
+    if case.form:
+        stated = STATED
+        real, form_error = _formed(real, fit, held, null, np.random.default_rng([effect_seed, 1]), on)
     graded = _graded(case, real, fit, null, effect_seed, on)
     rig, road_gain = _combined(real, graded.applied)
     held, shown, held_floor = _telling(held, real, rig, road_gain, 0.5 * case.grade, on)
@@ -117,19 +133,65 @@ def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Se
         "grade": case.grade,
         "ratio": {"fit": graded.ratio, "holdout": shown / held_floor},
         "gap": {"fit": graded.gap, "holdout": shown, "floor_fit": null.gap, "floor_holdout": held_floor},
-        "weakest": graded.weakest if case.effects else 0.0,
+        "weakest": graded.weakest * case.grade if case.effects else 0.0,
         "withheld": list(case.withhold),
         "seed": case.seed,
         "draw": draw,
         "tolerances_sigma": sigmas,
         "scenes": [asdict(scene) for scene in three],
     }
-    return label, sessions, [_config(on.nominal, scene) for scene in three]
+    if case.budgeted:
+        label["model_form"] = {"stated": stated, "true": form_error}
+        _add_budget(label, case, real, graded, effect_seed, (sessions[0], sessions[1]), on)
+    return label, sessions, [_config(on.nominal, scene, stated) for scene in three]
 
 
-def _config(nominal: Rig, scene: Scene) -> Rig:
+def _formed(
+    real: RicherRig, fit: Scene, held: Scene, null: Null, rng: np.random.Generator, on: Bench
+) -> tuple[RicherRig, float]:
+    """The rig with an error of its model's form, and how far the worst channel is off after the refit."""
+
+    def seen(rig: RicherRig) -> tuple[Observation, Observation]:
+        one, two = (observation(play(rig, on.nominal, scene, on.car.surface), on.nominal) for scene in (fit, held))
+        return one, two
+
+    return sized_form(real, drawn_form(rng), seen, null, on.car)
+
+
+def _add_budget(
+    label: dict[str, Any], case: Planned, real: RicherRig, graded: Graded, seed: int, logs: tuple[Session, Session],
+    on: Bench,
+) -> None:  # fmt: skip
+    """Write each effect's family, law, true shares and curve into the label."""
+    sizes = graded.sizes
+
+    def rig_with(members: frozenset[int]) -> RicherRig:
+        kept = sorted(members)
+        some = replace(case, effects=tuple(case.effects[i] for i in kept), laws=tuple(case.laws[i] for i in kept))
+        return _combined(real, _applied(some, real, tuple(sizes[i] for i in kept), seed))[0]
+
+    seen = (observation(logs[0], on.nominal), observation(logs[1], on.nominal))
+    drawn = true_logs(label["tolerances_sigma"])
+    budget = budget_of(len(case.effects), rig_with, logs, seen, drawn, on.car, on.car.surface)
+    everyone = frozenset(range(len(case.effects)))
+    for i, (item, law) in enumerate(zip(label["truth"], case.laws, strict=True)):
+        kind = get(item["effect"], law)
+        item |= {"family": item["effect"] if kind.known else None, "law": kind.law if kind.known else item["effect"],
+                 "foreign": kind.foreign, "share": budget.shares[i], "share_left_out": budget.left_out[i],
+                 "size": sizes[i]}  # fmt: skip
+        item["curve"] = curve_of(item["effect"], item["side"], tuple(item["places"]), rig_with(everyone),
+                                 rig_with(everyone - {i}), logs[1], on.car.surface)  # fmt: skip
+    total = sum(budget.shares)
+    for item in label["truth"]:
+        item["share_of_refit"] = item["share"] / total
+    label["refit_share"] = budget.refit
+    label["held_out"] = {"nominal": budget.nominal, "refit": budget.refitted, "complete": budget.complete}
+
+
+def _config(nominal: Rig, scene: Scene, form: float) -> Rig:
     """The rig file of a log: nominal, with the change that is known to have been made."""
-    return nominal.with_values(
+    changed = replace(nominal, model_form=Quantity(form, 0.0, "1")) if form else nominal
+    return changed.with_values(
         sprung_mass=nominal.sprung_mass.value + scene.added_mass,
         supply_pressure=nominal.supply_pressure.value + scene.supply_change,
     )
@@ -175,9 +237,10 @@ def _refitted(session: Session, on: Bench, start: Logs | None = None) -> tuple[f
 
 def _applied(case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
     out, rig = [], real
-    for (name, side), size in zip(case.effects, sizes, strict=True):
+    laws = case.laws or ("",) * len(case.effects)
+    for (name, side), law, size in zip(case.effects, laws, sizes, strict=True):
         # By name: an effect is the same alone, where it is sized, and in a pair.
-        done = get(name).apply(rig, size, side, np.random.default_rng([seed, zlib.crc32(name.encode())]))
+        done = get(name, law).apply(rig, size, side, np.random.default_rng([seed, zlib.crc32(name.encode())]))
         rig = done.rig
         out.append(done)
     return tuple(out)
@@ -192,18 +255,20 @@ def _combined(real: RicherRig, applied: tuple[Applied, ...]) -> tuple[RicherRig,
 def _graded(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
     """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
     sizes, weakest = [], math.inf
-    for one in case.effects:
-        size, alone = case.size, case.grade
+    for i, one in enumerate(case.effects):
+        grade = case.grades[i] if case.grades else case.grade
+        size, alone = case.size, grade
         if size is None:
-            size, alone = _search(replace(case, effects=(one,)), real, scene, null, seed, on)
+            only = replace(case, effects=(one,), laws=case.laws[i : i + 1], grade=grade)
+            size, alone = _search(only, real, scene, null, seed, on)
         sizes.append(size)
-        weakest = min(weakest, alone)
+        weakest = min(weakest, alone / grade)
     applied = _applied(case, real, tuple(sizes), seed)
     rig, road_gain = _combined(real, applied)
     value = null.gap
     if applied:
         value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
-    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, applied)
+    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, tuple(sizes), applied)
 
 
 def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
@@ -213,11 +278,18 @@ def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int,
 
     def ratio_at(size: float, careful: bool) -> float:
         rig, road_gain = _combined(real, _applied(case, real, (size,), seed))
-        session = play(rig, on.nominal, scene, on.car.surface, road_gain)
+        try:
+            session = play(rig, on.nominal, scene, on.car.surface, road_gain)
+        except NoRestError:
+            return math.inf
+        if case.budgeted and not careful:
+            seen = observation(session, on.nominal)
+            return bounded_gap(on.car, seen, null) / null.gap if np.isfinite(seen.measured).all() else math.inf
         return _left(session, null, on, careful) / null.gap
 
     start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
-    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)
+    tries = CAREFUL_TRIES if not case.budgeted or case.kind in ("single", "unknown") else ROUGH_TRIES
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, tries)
 
 
 def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
@@ -268,7 +340,9 @@ def _truth(case: Planned, graded: Graded) -> list[dict[str, Any]]:
             "side": side,
             "places": list(done.places),
             "parameters": {key: {"value": value, "unit": unit} for key, (value, unit) in done.parameters.items()},
-            "comparable": get(name).comparable,
+            "comparable": get(name, law).comparable,
         }
-        for (name, side), done in zip(case.effects, graded.applied, strict=True)
+        for (name, side), law, done in zip(
+            case.effects, case.laws or ("",) * len(case.effects), graded.applied, strict=True
+        )
     ]

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pneumo_ros.casemaker.registry import at_ends
 from pneumo_ros.casemaker.excitation import ROADS
 from pneumo_ros.casemaker.parameters import RicherRig, richer_rig
+from pneumo_ros.casemaker.registry import at_ends
 from pneumo_ros.casemaker.scene import Scene
 from pneumo_ros.rig import LIMITS, Rig
 from pneumo_ros.units import PSI

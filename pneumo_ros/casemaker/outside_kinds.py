@@ -56,8 +56,8 @@ def ballast_runs_out(rig: RicherRig, size: float, side: str | None, rng: Rng) ->
 
 @outside("channel_crosstalk", sides=ENDS)
 def channel_crosstalk(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
-    """A body LVDT picks up up to 20 % of its neighbour's signal."""
-    share, other = 0.2 * size * sign(rng), "rear" if side == "front" else "front"
+    """A body LVDT picks up as much as 35 % of its neighbour's signal."""
+    share, other = 0.35 * size * sign(rng), "rear" if side == "front" else "front"
     changed = with_law(rig, side, slots.CROSS, 1, share, AT_REST[other])
     return Applied(changed, {"share": (share, "1")}, (f"sensor:sprung_{side}",))
 

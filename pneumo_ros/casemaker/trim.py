@@ -56,7 +56,7 @@ def _rest_of(rig: RicherRig, outlets: tuple[float, float], surface: AreaSurface)
 
     The heights are those at which the levelling sensors read the design height, so a sensor fault moves the rig.
     """
-    loads = _loads(rig)
+    loads = loads_at_rest(rig)
     core = np.zeros(10)
     for index, (end, load) in enumerate(zip((rig.front, rig.rear), loads, strict=True)):
         core[2 + index] = -(load + end.unsprung_mass * GRAVITY) / end.tyre_stiffness
@@ -92,12 +92,14 @@ def residual(rig: RicherRig, rest: Rest, surface: AreaSurface) -> NDArray[np.flo
     rates = np.zeros(SIZE)
     still = (0.0, 0.0)
     static = (-float(rest.state[2]), -float(rest.state[3]))
-    derivative(rest.state, rates, 0.0, 1.0, rest.inlets, rest.outlets, still, still, static, *prepared(rig, rest)[:3],
-               rig.rows, surface)  # fmt: skip
+    ready = prepared(rig, rest)
+    derivative(rest.state, rates, 0.0, 1.0, rest.inlets, rest.outlets, still, still, static, *ready[:3], ready.rows,
+               surface)  # fmt: skip
     return rates
 
 
-def _loads(rig: RicherRig) -> tuple[float, float]:
+def loads_at_rest(rig: RicherRig) -> tuple[float, float]:
+    """What each spring carries, N."""
     a, b = rig.front.arm, -rig.rear.arm
     body, loose = rig.frame.sprung_mass * GRAVITY, rig.frame.loose_mass * GRAVITY
     arm = rig.frame.loose_arm
@@ -154,7 +156,7 @@ def _outflows(core: NDArray[np.float64], outlets: tuple[float, float], rig: Rich
     return flows[0], flows[1]
 
 
-def _supply(flows: tuple[float, float], rig: RicherRig) -> float:
+def supply_at_rest(flows: tuple[float, float], rig: RicherRig) -> float:
     """Pressure at the valves at rest, Pa."""
     frame, law, used = rig.frame, rig.rows[0, SUPPLY], sum(flows)
     if frame.tank_volume <= 0.0:
@@ -174,7 +176,7 @@ def _supply(flows: tuple[float, float], rig: RicherRig) -> float:
 
 def _inlets(core: NDArray[np.float64], outlets: tuple[float, float], rig: RicherRig) -> tuple[float, float]:
     flows = _outflows(core, outlets, rig)
-    supply, temperature = _supply(flows, rig), rig.frame.supply_temperature
+    supply, temperature = supply_at_rest(flows, rig), rig.frame.supply_temperature
     found, rows = [], rig.rows
     for index, end in enumerate((rig.front, rig.rear)):
         found.append(_inlet(max(0.0, flows[index]), supply, float(core[8 + index]), temperature, rows[index], end, rig))
@@ -199,6 +201,6 @@ def _fill_flows(
     state: NDArray[np.float64], inlets: tuple[float, float], outlets: tuple[float, float], rig: RicherRig
 ) -> None:
     flows = _outflows(state, outlets, rig)
-    state[TANK] = _supply(flows, rig)
+    state[TANK] = supply_at_rest(flows, rig)
     state[HOSE] = sum(flows)
     state[FRONT + COLUMN], state[REAR + COLUMN] = flows
