@@ -69,6 +69,7 @@ def budget_of(
     drawn: NDArray[np.float64],
     car: HalfCar,
     surface: AreaSurface,
+    orders: bool = True,
 ) -> Budget:
     """Budget of a case with ``count`` effects.
 
@@ -77,6 +78,7 @@ def budget_of(
     rig_with : the true rig with a subset of its effects
     logs, seen : fit and held-out session
     drawn : logs of the tolerances' true values, (16,)
+    orders : whether all subsets are simulated; otherwise the shares are those left out last, at a fraction of the time
     """
     full = rig_with(frozenset(range(count)))
     slopes = [sensitivities(car, one, drawn) for one in seen]
@@ -94,11 +96,12 @@ def budget_of(
         return float(np.mean((errors[1] - slopes[1].jacobian @ step) ** 2))
 
     everyone = frozenset(range(count))
-    value = {s: left(s) for k in range(count + 1) for s in map(frozenset, combinations(range(count), k))}
+    sizes = range(count + 1) if orders else sorted({0, max(count - 1, 0), count})
+    value = {s: left(s) for k in sizes for s in map(frozenset, combinations(range(count), k))}
     nominal = gap(free_run(perturbed(car, np.zeros(len(NUISANCE))), seen[1]), seen[1])
     whole = nominal**2 - value[everyone]
-    shares = [_shapley(i, count, value) / whole for i in range(count)]
     last = [(value[everyone - {i}] - value[everyone]) / whole for i in range(count)]
+    shares = [_shapley(i, count, value) / whole for i in range(count)] if orders else last
     empty: Subset = frozenset()
     return Budget(tuple(shares), tuple(last), (nominal**2 - value[empty]) / whole, nominal, math.sqrt(value[empty]),
                   math.sqrt(value[everyone]))  # fmt: skip

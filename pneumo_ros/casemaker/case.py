@@ -8,13 +8,14 @@ import shutil
 import zlib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.casemaker.budget import budget_of, true_logs
+from pneumo_ros.casemaker.budget import Budget, budget_of, true_logs
 from pneumo_ros.casemaker.catalogue import get
 from pneumo_ros.casemaker.curves import curve_of
 from pneumo_ros.casemaker.draw import drawn_rig, imperfect_rig, scenes
@@ -26,6 +27,7 @@ from pneumo_ros.casemaker.plan import Planned
 from pneumo_ros.casemaker.refit import bounded_gap
 from pneumo_ros.casemaker.registry import Applied
 from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
+from pneumo_ros.casemaker.simulate import STEP
 from pneumo_ros.casemaker.trim import NoRestError
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.trim import nominal_half_car
@@ -36,8 +38,10 @@ LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
 GRADE_TOLERANCE = 0.04  # relative
 QUICK_TRIES, CAREFUL_TRIES = 5, 9
-ROUGH_TRIES = 2  # of several effects together: their shares are measured anyway
+ROUGH_TOLERANCE = 0.2  # of the grade of one of several effects
+PART, GROWTH = 0.03, 1.7  # smallest part of what the refit leaves that one of several holds; else it grows by this
 DRAWS, ACTS = 4, 0.5  # draws at most; share of the grade that each effect must reach alone
+SEARCH_STEP = 0.5e-3  # s, of the richer rig while a size is searched
 RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
 
 
@@ -105,16 +109,26 @@ def simulated(case: Planned, on: Bench) -> tuple[dict[str, Any], list[Session], 
             if draw == DRAWS - 1:
                 raise
             continue
-        if label["weakest"] >= ACTS * case.grade and all(np.isfinite(one.sensors).all() for one in sessions):
+        if (
+            label["weakest"] >= ACTS * case.grade
+            and _each_holds_a_part(label, case)
+            and all(np.isfinite(one.sensors).all() for one in sessions)
+        ):
             break
     return label, sessions, configs
+
+
+def _each_holds_a_part(label: dict[str, Any], case: Planned) -> bool:
+    """Whether each of several effects makes a few percent of what the refit leaves of the held-out log."""
+    return not case.grades or len(case.effects) < 2 or min(i["share_of_refit"] for i in label["truth"]) >= PART
 
 
 def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Session], list[Rig]]:
     rng = np.random.default_rng(case.seed if draw == 0 else [case.seed, draw])
     drawn, sigmas = drawn_rig(on.nominal, rng)
     real = imperfect_rig(drawn, on.nominal, on.references, rng)
-    fit, held, edit = (_rideable(scene, real, on) for scene in scenes(rng, case.imperfect))
+    step = SEARCH_STEP if case.budgeted else STEP
+    fit, held, edit = (_rideable(scene, real, on, step) for scene in scenes(rng, case.imperfect))
     effect_seed = int(rng.integers(1, 2**31))
     null = null_of(on.car, observation(play(real, on.nominal, fit, on.car.surface), on.nominal))
     stated, form_error = 0.0, 0.0
@@ -122,8 +136,13 @@ def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Se
         stated = STATED
         real, form_error = _formed(real, fit, held, null, np.random.default_rng([effect_seed, 1]), on)
     graded = _graded(case, real, fit, null, effect_seed, on)
+    for _ in range(3 if case.budgeted and len(case.effects) > 1 else 0):
+        grown = _grown(case, real, graded, effect_seed, (fit, held), true_logs(sigmas), on)
+        if grown == graded.sizes:
+            break
+        graded = _of_sizes(case, real, grown, graded.weakest, fit, null, effect_seed, on)
     rig, road_gain = _combined(real, graded.applied)
-    held, shown, held_floor = _telling(held, real, rig, road_gain, 0.5 * case.grade, on)
+    held, shown, held_floor = _telling(held, real, rig, road_gain, 0.5 * case.grade, on, step)
     three = (fit, held, edit)
     sessions = [play(rig, on.nominal, scene, on.car.surface, road_gain) for scene in three]
     label = {
@@ -164,15 +183,11 @@ def _add_budget(
 ) -> None:  # fmt: skip
     """Write each effect's family, law, true shares and curve into the label."""
     sizes = graded.sizes
+    budget = _budget(case, real, sizes, seed, logs, true_logs(label["tolerances_sigma"]), on)
 
     def rig_with(members: frozenset[int]) -> RicherRig:
-        kept = sorted(members)
-        some = replace(case, effects=tuple(case.effects[i] for i in kept), laws=tuple(case.laws[i] for i in kept))
-        return _combined(real, _applied(some, real, tuple(sizes[i] for i in kept), seed))[0]
+        return _with_some(case, real, sizes, seed, members)
 
-    seen = (observation(logs[0], on.nominal), observation(logs[1], on.nominal))
-    drawn = true_logs(label["tolerances_sigma"])
-    budget = budget_of(len(case.effects), rig_with, logs, seen, drawn, on.car, on.car.surface)
     everyone = frozenset(range(len(case.effects)))
     for i, (item, law) in enumerate(zip(label["truth"], case.laws, strict=True)):
         kind = get(item["effect"], law)
@@ -188,6 +203,24 @@ def _add_budget(
     label["held_out"] = {"nominal": budget.nominal, "refit": budget.refitted, "complete": budget.complete}
 
 
+def _with_some(
+    case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int, members: frozenset[int]
+) -> RicherRig:
+    """The true rig with some of its effects."""
+    kept = sorted(members)
+    some = replace(case, effects=tuple(case.effects[i] for i in kept), laws=tuple(case.laws[i] for i in kept))
+    return _combined(real, _applied(some, real, tuple(sizes[i] for i in kept), seed))[0]
+
+
+def _budget(
+    case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int, logs: tuple[Session, Session], drawn: Logs,
+    on: Bench, orders: bool = True,
+) -> Budget:  # fmt: skip
+    seen = (observation(logs[0], on.nominal), observation(logs[1], on.nominal))
+    some: Callable[[frozenset[int]], RicherRig] = partial(_with_some, case, real, sizes, seed)
+    return budget_of(len(case.effects), some, logs, seen, drawn, on.car, on.car.surface, orders)
+
+
 def _config(nominal: Rig, scene: Scene, form: float) -> Rig:
     """The rig file of a log: nominal, with the change that is known to have been made."""
     changed = replace(nominal, model_form=Quantity(form, 0.0, "1")) if form else nominal
@@ -197,17 +230,17 @@ def _config(nominal: Rig, scene: Scene, form: float) -> Rig:
     )
 
 
-def _rideable(scene: Scene, real: RicherRig, on: Bench) -> Scene:
+def _rideable(scene: Scene, real: RicherRig, on: Bench, step: float) -> Scene:
     """The scene with its road lowered until tyres stay loaded and springs inside their table."""
     for _ in range(12):
-        if inside_bounds(on.car, play(real, on.nominal, scene, on.car.surface)):
+        if inside_bounds(on.car, play(real, on.nominal, scene, on.car.surface, step=step)):
             return scene
         scene = replace(scene, gain=0.87 * scene.gain, valve_size=0.95 * scene.valve_size)
     return scene
 
 
 def _telling(
-    held: Scene, real: RicherRig, rig: RicherRig, road_gain: float, wanted: float, on: Bench
+    held: Scene, real: RicherRig, rig: RicherRig, road_gain: float, wanted: float, on: Bench, step: float
 ) -> tuple[Scene, float, float]:
     """The held-out scene, changed if it would hardly show the effect; with the gap in it and its null floor.
 
@@ -217,8 +250,8 @@ def _telling(
     best: tuple[Scene, float, float] | None = None
     for gain in (1.0, 1.35, 1.8):
         scene = held if gain == 1.0 else replace(held, valves="steps", gain=gain * held.gain)
-        floor, start = _refitted(play(real, on.nominal, scene, on.car.surface), on)
-        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, start)[0]
+        floor, start = _refitted(play(real, on.nominal, scene, on.car.surface, step=step), on)
+        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain, step), on, start)[0]
         if best is None or (math.isfinite(value) and value / floor > best[1] / best[2]):
             best = (scene, value, floor)
         if value / floor >= wanted:
@@ -263,12 +296,36 @@ def _graded(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int,
             size, alone = _search(only, real, scene, null, seed, on)
         sizes.append(size)
         weakest = min(weakest, alone / grade)
-    applied = _applied(case, real, tuple(sizes), seed)
+    return _of_sizes(case, real, tuple(sizes), weakest, scene, null, seed, on)
+
+
+def _of_sizes(
+    case: Planned, real: RicherRig, sizes: tuple[float, ...], weakest: float, scene: Scene, null: Null, seed: int,
+    on: Bench,
+) -> Graded:  # fmt: skip
+    """The effects together at their sizes, and how large the whole is."""
+    applied = _applied(case, real, sizes, seed)
     rig, road_gain = _combined(real, applied)
     value = null.gap
     if applied:
         value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
-    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, tuple(sizes), applied)
+    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, sizes, applied)
+
+
+def _grown(
+    case: Planned, real: RicherRig, graded: Graded, seed: int, scenes: tuple[Scene, Scene], drawn: Logs, on: Bench
+) -> tuple[float, ...]:
+    """Sizes, larger for those of several effects that hold too little of the held-out gap."""
+    rig, road_gain = _combined(real, graded.applied)
+    logs = tuple(play(rig, on.nominal, scene, on.car.surface, road_gain, SEARCH_STEP) for scene in scenes)
+    if not all(np.isfinite(log.run.measured).all() for log in logs):
+        return graded.sizes
+    budget = _budget(case, real, graded.sizes, seed, (logs[0], logs[1]), drawn, on, orders=False)
+    total = sum(budget.shares)
+    return tuple(
+        min(1.0, GROWTH * size) if share < 1.3 * PART * total else size
+        for size, share in zip(graded.sizes, budget.shares, strict=True)
+    )
 
 
 def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
@@ -276,10 +333,12 @@ def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int,
     refit decides.
     """
 
+    step = SEARCH_STEP if case.budgeted else STEP
+
     def ratio_at(size: float, careful: bool) -> float:
         rig, road_gain = _combined(real, _applied(case, real, (size,), seed))
         try:
-            session = play(rig, on.nominal, scene, on.car.surface, road_gain)
+            session = play(rig, on.nominal, scene, on.car.surface, road_gain, step)
         except NoRestError:
             return math.inf
         if case.budgeted and not careful:
@@ -287,12 +346,16 @@ def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int,
             return bounded_gap(on.car, seen, null) / null.gap if np.isfinite(seen.measured).all() else math.inf
         return _left(session, null, on, careful) / null.gap
 
-    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, min(0.02 * case.grade, 0.5), QUICK_TRIES)
-    tries = CAREFUL_TRIES if not case.budgeted or case.kind in ("single", "unknown") else ROUGH_TRIES
-    return _sized(lambda size: ratio_at(size, True), case.grade, start, tries)
+    first = min(0.02 * case.grade, 0.5)
+    if case.budgeted and case.kind not in ("single", "unknown"):  # of several at once the shares are measured anyway
+        return _sized(lambda size: ratio_at(size, False), case.grade, first, QUICK_TRIES, ROUGH_TOLERANCE)
+    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, first, QUICK_TRIES)
+    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)
 
 
-def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries: int) -> tuple[float, float]:
+def _sized(
+    ratio_at: Callable[[float], float], grade: float, start: float, tries: int, tolerance: float = GRADE_TOLERANCE
+) -> tuple[float, float]:
     """(size, its ratio): false position on log(excess over the floor) against log(size)."""
     wanted = 0.5 * math.log(grade**2 - 1.0)
     low: tuple[float, float] | None = None
@@ -304,7 +367,7 @@ def _sized(ratio_at: Callable[[float], float], grade: float, start: float, tries
         off = abs(math.log(ratio / grade)) if 0.0 < ratio < math.inf else math.inf
         if off < closest:
             best, closest = (size, ratio), off
-        if off < GRADE_TOLERANCE or (size >= 1.0 and ratio < grade):
+        if off < tolerance or (size >= 1.0 and ratio < grade):
             break
         excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
         if excess < wanted:

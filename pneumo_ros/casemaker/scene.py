@@ -13,7 +13,7 @@ from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING
 from pneumo_ros.casemaker.excitation import road, valve_steps, valve_waves
 from pneumo_ros.casemaker.gap_size import Observation
 from pneumo_ros.casemaker.parameters import RicherRig
-from pneumo_ros.casemaker.simulate import Run, simulate
+from pneumo_ros.casemaker.simulate import STEP, Run, simulate
 from pneumo_ros.casemaker.trim import prepared, rest_of
 from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.plant.half_car import HalfCar
@@ -82,7 +82,9 @@ class Session:
     kept: NDArray[np.bool_]
 
 
-def play(rig: RicherRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_gain: float = 1.0) -> Session:
+def play(
+    rig: RicherRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_gain: float = 1.0, step: float = STEP
+) -> Session:
     """Simulate one log of a rig.
 
     Parameters
@@ -90,6 +92,7 @@ def play(rig: RicherRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_
     rig : the rig with its faults
     nominal : the rig file the log carries: outlets and noise
     road_gain : extra factor that an effect needs
+    step : of the integrator, s
     """
     time = _time()
     changed = rig._replace(
@@ -106,7 +109,7 @@ def play(rig: RicherRig, nominal: Rig, scene: Scene, surface: AreaSurface, road_
     sigma = np.array([nominal.displacement_noise.value] * 4 + [nominal.pressure_noise.value] * 2)
     noise = sigma * np.random.default_rng([scene.seed, 1]).normal(size=(SAMPLES, 6))
     shake = excite(time, scene.valve_size, scene.seed + 1)
-    done = simulate(prepared(changed, rest), rest, ground, shake, noise, surface, gains, PERIOD)
+    done = simulate(prepared(changed, rest), rest, ground, shake, noise, surface, gains, PERIOD, step=step)
     return _sampled(time, done, noise, ground, outlets, scene)
 
 

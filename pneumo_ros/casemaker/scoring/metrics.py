@@ -27,13 +27,14 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """none, single, pair, unknown or withheld."""
+        """none, single, pair, several, mixed, unknown or withheld."""
         return str(self.label["kind"])
 
     @property
     def truth(self) -> frozenset[str]:
-        """Effects that act."""
-        return frozenset(item["effect"] for item in self.label["truth"])
+        """Effects that act; of a mixed case those that have a family."""
+        known = (item for item in self.label["truth"] if self.kind != "mixed" or item["family"])
+        return frozenset(item["effect"] for item in known)
 
     @property
     def clear(self) -> bool:

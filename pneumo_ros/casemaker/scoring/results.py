@@ -27,6 +27,8 @@ class Found:
     group : ids that the log cannot tell from the verdict
     gap : held-out gaps: nominal, refit, best, noise_floor
     edit : gaps on the edit log: nominal, refit, best; empty when it was not predicted
+    budget : from 0.4 on, entries of the gap's budget, largest first
+    refit_share, remainder_share : from 0.4 on, of the nominal gap; NaN before
     seconds : wall clock of the diagnosis
     commit : of the software that made it
     """
@@ -38,6 +40,9 @@ class Found:
     group: tuple[str, ...] = ()
     gap: Mapping[str, Any] = field(default_factory=dict)
     edit: Mapping[str, Any] = field(default_factory=dict)
+    budget: tuple[dict[str, Any], ...] = ()
+    refit_share: float = math.nan
+    remainder_share: float = math.nan
     seconds: float = math.nan
     commit: str = "unknown"
 
@@ -76,9 +81,16 @@ def parse(diagnosis: Mapping[str, Any], seconds: float = math.nan, commit: str =
         group=tuple(map(str, diagnosis.get("ambiguity_group", []))),
         gap=diagnosis.get("gap", {}),
         edit={key.removeprefix("gap_"): value for key, value in (diagnosis.get("edit_test") or {}).items()},
+        budget=tuple(diagnosis.get("budget") or ()),
+        refit_share=_share_of(diagnosis.get("refit_share")),
+        remainder_share=_share_of((diagnosis.get("remainder") or {}).get("share")),
         seconds=seconds,
         commit=commit,
     )
+
+
+def _share_of(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def load_results(folder: Path, cases: Mapping[str, object]) -> dict[str, Found]:
