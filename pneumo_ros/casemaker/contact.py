@@ -56,7 +56,13 @@ def hunt_crossley(height: float, speed: float, end: End) -> float:
 
 @njit(cache=True)
 def elastic_tyre(deflection: float, static: float, rows: NDArray[np.float64], end: End) -> float:
-    """Force without losses, N; a second law of lift-off agrees with the linear tyre at rest."""
+    """Force without losses, N upwards on the axle; a second law of lift-off agrees with the linear tyre at rest.
+
+    Parameters
+    ----------
+    deflection : road minus axle height, m
+    static : deflection at rest, m: the hardening is cubic about it, so that it leaves the trim alone
+    """
     if rows[LIFTOFF, 0] > 0.0:
         return end.tyre_stiffness * static * lift(rows[LIFTOFF], deflection / static)
     about = deflection - static
@@ -77,22 +83,6 @@ def lossy_tyre(
         force += tyre_loss(rows[TYRE_LOSS], x, dx, at, rate, deflection / static)
     if rows[LIFTOFF, 0] > 0.0:
         return 0.0 if deflection <= 0.0 and rows[LIFTOFF, 0] == 1.0 else max(0.0, force)
-    if end.unilateral <= 0.0:
-        return force
-    return 0.0 if deflection <= 0.0 else max(0.0, force)
-
-
-@njit(cache=True)
-def tyre_force(deflection: float, rate: float, static: float, end: End) -> float:
-    """Force on the axle, N upwards.
-
-    Parameters
-    ----------
-    deflection, rate : road minus axle height, m and m/s
-    static : deflection at rest, m: the hardening is cubic about it, so that it leaves the trim alone
-    """
-    about = deflection - static
-    force = end.tyre_stiffness * (deflection + end.tyre_hardening * about**3) + end.tyre_damping * rate
     if end.unilateral <= 0.0:
         return force
     return 0.0 if deflection <= 0.0 else max(0.0, force)

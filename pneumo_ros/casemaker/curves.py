@@ -7,7 +7,6 @@ Forces act on the body, N upwards (on the axle for the tyre's); rates are of ext
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,13 @@ from numpy.typing import NDArray
 
 from pneumo_ros.casemaker.contact import lossy_tyre
 from pneumo_ros.casemaker.derivative import FRONT, REAR, SPOOL, TANK, TREAD, inlet_flow, lost_flow, suspension_force
+from pneumo_ros.casemaker.open_loop import read
 from pneumo_ros.casemaker.parameters import End, Frame, RicherRig
 from pneumo_ros.casemaker.scene import Session
 from pneumo_ros.plant.air_spring import AreaSurface
 
-BINS = 30
+BINS, FEWEST = 30, 5
+CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
 Samples = NDArray[np.float64]
 Curve = dict[str, Any]
 STRUT_OVER_RATE = ("coulomb_friction", "viscous_damping")
@@ -128,10 +129,7 @@ def _of_flow(effect: str, end: str, rig: RicherRig, without: RicherRig, session:
 
 def _of_sensor(place: str, rig: RicherRig, without: RicherRig, session: Session) -> Curve:
     """Error over the true value, from the two rigs' readings of the same states."""
-    from pneumo_ros.casemaker.open_loop import read
-
-    channel = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure").index(
-        place.removeprefix("sensor:"))  # fmt: skip
+    channel = CHANNELS.index(place.removeprefix("sensor:"))
     states = session.run.states[::5]
     pairs = np.array([(read(without, x)[channel], read(rig, x)[channel]) for x in states])
     unit = "m" if channel < 4 else "Pa"
@@ -139,15 +137,11 @@ def _of_sensor(place: str, rig: RicherRig, without: RicherRig, session: Session)
 
 
 def _binned(x: Samples, y: Samples, horizontal: tuple[str, str], vertical: tuple[str, str]) -> Curve:
-    """Means of ``y`` in equal bins of ``x`` between its 1st and 99th percentile, with each bin's share of the samples."""
+    """Means of ``y`` in equal bins of ``x`` (1st to 99th percentile), with each bin's share of the samples."""
     low, high = np.percentile(x, (1.0, 99.0))
     edges = np.linspace(low, max(high, low + 1e-12), BINS + 1)
     where = np.digitize(x, edges) - 1
-    inside: Callable[[int], NDArray[np.bool_]] = lambda k: where == k  # noqa: E731
-    points = [
-        [float(x[inside(k)].mean()), float(y[inside(k)].mean()), float(inside(k).mean())]
-        for k in range(BINS)
-        if inside(k).sum() >= 5
-    ]
+    bins = [where == k for k in range(BINS)]
+    points = [[float(x[one].mean()), float(y[one].mean()), float(one.mean())] for one in bins if one.sum() >= FEWEST]
     return {"x": {"name": horizontal[0], "unit": horizontal[1]}, "y": {"name": vertical[0], "unit": vertical[1]},
             "points": points}  # fmt: skip

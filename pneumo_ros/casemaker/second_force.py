@@ -66,7 +66,7 @@ def _hysteresis(rig: RicherRig, side: str | None, level: float, number: int, *va
 
 @second_law("bellows_hysteresis", "iwan")
 def iwan(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
-    """Parallel sliders whose slip forces follow a power law (Segalman 2005): up to 25 N, the last slips at 3 to 8 mm."""
+    """Parallel sliders whose slip forces follow a power law (Segalman 2005): up to 25 N, the last slips at 3-8 mm."""
     return _hysteresis(rig, side, 25.0 * size, 1, rng.uniform(3e-3, 8e-3), rng.uniform(-0.8, -0.2))
 
 
@@ -247,8 +247,8 @@ def sloshing(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied
 
 @second_law("exciter_lag", "rate_limited")
 def rate_limited_exciter(rig: RicherRig, size: float, side: str | None, rng: Rng) -> Applied:
-    """The servo valve's flow is limited: the road moves no faster than 30 mm/s over size, else 2 ms late
-    (Merritt 1967)."""
+    """The servo valve's flow is limited (Merritt 1967): the road moves no faster than 12 mm/s at the largest size, the
+    faster the smaller it is, and else 2 ms late."""
     limit = 0.012 / max(size, 1e-3)
     changed = with_law(rig, side, slots.EXCITER, 2, 2e-3, limit)
     return Applied(changed, {"speed": (limit, "m/s")}, ("road_input",))

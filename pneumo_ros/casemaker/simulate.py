@@ -89,7 +89,7 @@ def initial_state(core: NDArray[np.float64], inlets: tuple[float, float], rig: R
     for law in rig.laws:
         if law.row == MODE_LAW and law.number == 2:  # hangs between both plates
             at, end = (FRONT, 0) if law.end == "front" else (REAR, 1)
-            x[at + MODE] = 0.5 * (x[0] + rig[1 + end].arm * x[1] + x[2 + end])
+            x[at + MODE] = 0.5 * (x[0] + (rig.front, rig.rear)[end].arm * x[1] + x[2 + end])
     x[TANK] = rig.frame.supply_pressure
     if rig.frame.loose_mass > 0.0:
         x[LOOSE] = x[0] + rig.frame.loose_arm * x[1] - GRAVITY / rig.frame.loose_frequency**2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.folders import PACKAGE
 
-from pneumo_ros.casemaker import catalogue, contact
+from pneumo_ros.casemaker import catalogue, contact, registry
 from pneumo_ros.casemaker.case import bench
 from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING, Controller
 from pneumo_ros.casemaker.excitation import ROADS, road, valve_steps
@@ -44,7 +44,7 @@ def test_without_extras_it_is_the_plant_of_the_contract(gains: Controller) -> No
 
 def test_closed_chamber_with_its_own_energy_balance_is_adiabatic() -> None:
     """No flow and no wall heat: the first law gives P V^n constant, the contract's law too."""
-    sealed = catalogue.at_ends(RICHER, "both", inlet_scale=1e-12, outlet_scale=1e-12, open_energy=1.0)
+    sealed = registry.at_ends(RICHER, "both", inlet_scale=1e-12, outlet_scale=1e-12, open_energy=1.0)
     rest = rest_of(RICHER, TRIM.outlets, CAR.surface)
     time = PERIOD * np.arange(1501)
     ground = road("multisine", time, RIG.wheelbase, 1.5, 3)
@@ -57,7 +57,7 @@ def test_closed_chamber_with_its_own_energy_balance_is_adiabatic() -> None:
 
 
 def test_heat_to_the_wall_turns_the_sealed_chamber_isothermal() -> None:
-    sealed = catalogue.at_ends(RICHER, "both", inlet_scale=1e-12, outlet_scale=1e-12, heat=60.0)
+    sealed = registry.at_ends(RICHER, "both", inlet_scale=1e-12, outlet_scale=1e-12, heat=60.0)
     rest = rest_of(RICHER, TRIM.outlets, CAR.surface)
     time = PERIOD * np.arange(1501)
     ground = road("multisine", time, RIG.wheelbase, 1.5, 3)
@@ -92,8 +92,9 @@ def test_bellows_loop_dissipates_and_closes() -> None:
 def test_tyre_leaves_the_ground_and_stop_never_pulls() -> None:
     end = RICHER.front._replace(unilateral=1.0, tyre_damping=50.0, contact_stiffness=5e5, contact_height=0.04,
                               contact_damping=0.5)  # fmt: skip
-    assert contact.tyre_force(-1e-3, 0.0, 0.016, end) == 0.0
-    assert contact.tyre_force(1e-4, -1.0, 0.016, end) == 0.0
+    x, rows = np.zeros(1), RICHER.rows[0]
+    assert contact.lossy_tyre(x, x, 0, -1e-3, 0.0, 0.016, rows, end) == 0.0
+    assert contact.lossy_tyre(x, x, 0, 1e-4, -1.0, 0.016, rows, end) == 0.0
     assert contact.hunt_crossley(0.039, 5.0, end) == 0.0
     assert contact.hunt_crossley(0.041, -1.0, end) == 0.0
     assert contact.hunt_crossley(0.035, 0.0, end) > 0.0
@@ -110,7 +111,7 @@ def test_every_effect_starts_at_rest_and_moves_its_own_end(name: str) -> None:
             assert np.abs(rates[[*range(8), 16, 17]]).max() < 1e-6
             assert np.abs(rates[8:10]).max() < 1.0  # Pa/s
         changed = {end for end in ("front", "rear") if getattr(applied.rig, end) != getattr(RICHER, end)}
-        assert changed <= set(catalogue.ends_of(side))
+        assert changed <= set(registry.ends_of(side))
         ends = {p.split(":")[-1].replace("sprung_", "").replace("un", "").split("_")[0] for p in applied.places}
         if side in ("front", "rear") and not ends & {"road", "body", "supply"}:
             assert ends == {side}
@@ -159,9 +160,9 @@ def test_roads_start_still_and_the_rear_follows(kind: str) -> None:
 
 
 def test_delay_and_overlap_act_between_command_and_flow() -> None:
-    late = short_run(catalogue.at_ends(RICHER, "front", valve_delay=0.05), flat=True)
+    late = short_run(registry.at_ends(RICHER, "front", valve_delay=0.05), flat=True)
     assert np.allclose(late.states[:, 8], late.states[0, 8], rtol=1e-9)
-    overlap = catalogue.at_ends(RICHER, "front", valve_overlap=2e-7)
+    overlap = registry.at_ends(RICHER, "front", valve_overlap=2e-7)
     rest = rest_of(overlap, TRIM.outlets, CAR.surface)
     assert rest.inlets[0] == pytest.approx(TRIM.inlets[0] + 2e-7)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pneumo_ros.casemaker.catalogue import known_effects
-from pneumo_ros.casemaker.plan import SETS, plan
+from pneumo_ros.casemaker.plan import MIXTURES, SETS, plan
 from pneumo_ros.casemaker.scoring import metrics as m
 from pneumo_ros.casemaker.scoring.baselines import applied
 from pneumo_ros.casemaker.scoring.calibration import expected_error, risk_coverage
@@ -167,8 +167,8 @@ def test_results_are_read_as_the_contract_says(tmp_path: Path) -> None:
         load_results(tmp_path, {"x": 0})
 
 
-def test_full_set_has_the_promised_mix() -> None:
-    cases = plan("full")
+def test_full_set_of_0_3_has_the_promised_mix() -> None:
+    cases = plan("full-0.3")
     assert len(cases) == 240
     assert Counter(c.kind for c in cases) == {"none": 64, "single": 100, "pair": 36, "unknown": 28, "withheld": 12}
     single = [c for c in cases if c.kind == "single"]
@@ -177,12 +177,12 @@ def test_full_set_has_the_promised_mix() -> None:
     assert len({c.effects[0][0] for c in cases if c.kind == "unknown"}) >= 8
     assert len({c.seed for c in cases}) == 240
     assert all(c.withhold == (c.effects[0][0],) for c in cases if c.kind == "withheld")
-    assert sum(bool(c.withhold) for c in cases if c.kind != "withheld") == SETS["full"].decoys
-    assert plan("full") == cases
+    assert sum(bool(c.withhold) for c in cases if c.kind != "withheld") == SETS["full-0.3"].decoys
+    assert plan("full-0.3") == cases
     with pytest.raises(InputError, match="unknown set"):
         plan("nope")
 
 
 def test_sets_share_no_seed() -> None:
-    seeds = [case.seed for name in (*SETS, "ci") for case in plan(name)]
+    seeds = [case.seed for name in (*SETS, *MIXTURES, "ci") for case in plan(name)]
     assert len(set(seeds)) == len(seeds)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from pneumo_ros.plant.orifice import mass_flow
 from pneumo_ros.units import GAS_CONSTANT
 
-Row = NDArray  # (COLUMNS,)
+Row = NDArray[np.float64]  # (COLUMNS,)
+State = NDArray[np.float64]
 FLOW_AT_REST = 1.5e-3  # kg/s, about what one inlet passes at rest: the scale of forced convection
 
 
@@ -34,7 +36,7 @@ def leak(p: Row, pressure: float, ambient: float, temperature: float, exponent: 
 
 @njit(cache=True, error_model="numpy")
 def heat(
-    p: Row, x: NDArray, dx: NDArray, wall: int, gas: float, outside: float, inflow: float, squeeze: float, speed: float
+    p: Row, x: State, dx: State, wall: int, gas: float, outside: float, inflow: float, squeeze: float, speed: float
 ) -> float:
     """Heat into the gas, W; ``gas`` and ``outside`` are temperatures, K, ``squeeze`` the work rate P dV/dt, W.
 
@@ -86,7 +88,7 @@ def _ellipse(ratio: float, critical: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def refill(p: Row, x: NDArray, dx: NDArray, memory: int, source: float, tank: float, temperature: float,
+def refill(p: Row, x: State, dx: State, memory: int, source: float, tank: float, temperature: float,
            exponent: float) -> float:  # fmt: skip
     """Flow that refills the tank at the valves.
 

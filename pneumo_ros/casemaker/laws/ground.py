@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Row = NDArray  # (COLUMNS,)
+Row = NDArray[np.float64]  # (COLUMNS,)
+State = NDArray[np.float64]
 
 
 @njit(cache=True, error_model="numpy")
@@ -57,7 +59,7 @@ def late(p: Row, time: float, period: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def tyre_loss(p: Row, x: NDArray, dx: NDArray, at: int, rate: float, load: float) -> float:
+def tyre_loss(p: Row, x: State, dx: State, at: int, rate: float, load: float) -> float:
     """Force of the tyre's rubber, N upwards on the axle; ``rate`` of the deflection, ``load`` over the one at rest.
 
     1 hysteretic: elastic, then slipping (Prandtl), whatever the speed; N, m.

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Row = NDArray  # (COLUMNS,)
+Row = NDArray[np.float64]  # (COLUMNS,)
+State = NDArray[np.float64]
 SLIDERS = 5
 
 
@@ -50,7 +52,7 @@ def friction(p: Row, z: float, speed: float, spring: float) -> tuple[float, floa
 
 
 @njit(cache=True, error_model="numpy")
-def hysteresis(p: Row, x: NDArray, dx: NDArray, at: int, sliders: int, speed: float, depth: float) -> float:
+def hysteresis(p: Row, x: State, dx: State, at: int, sliders: int, speed: float, depth: float) -> float:
     """Force of the bellows' memory; fills its rates. ``depth`` is how far the spring is below its design height, m.
 
     1 iwan: parallel sliders whose slip forces follow a power law (Segalman, J. Appl. Mech. 72, 2005); total N, largest
@@ -98,7 +100,7 @@ def damping(p: Row, speed: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def mode(
-    p: Row, x: NDArray, dx: NDArray, at: int, height: float, speed: float, top: float, axle: float
+    p: Row, x: State, dx: State, at: int, height: float, speed: float, top: float, axle: float
 ) -> tuple[float, float]:
     """Forces on body and on axle of a moving part of the bellows, N upwards; fills its rates.
 

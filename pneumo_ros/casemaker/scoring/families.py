@@ -143,7 +143,7 @@ def stated_share(case: Case, effect: str, of_refit: bool) -> float:
 
 
 def share_error(cases: Sequence[Case], of_refit: bool) -> float:
-    """Median error of the budget's shares against the true ones, over the effects with a family in cases with alarms."""
+    """Median error of the budget's shares against the true ones, over the effects with a family at a clear gap."""
     key = "share_of_refit" if of_refit else "share"
     errors = [
         abs(stated_share(c, item["effect"], of_refit) - float(item[key]))
