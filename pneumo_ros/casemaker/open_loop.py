@@ -17,7 +17,12 @@ STEP = 0.5e-3  # s: a bristle's 1500/s is still stable, and the log's first digi
 
 
 def shown(rig: RicherRig, full: RicherRig, session: Session, surface: AreaSurface) -> NDArray[np.float64]:
-    """Outputs, (N + 1, 6) without noise, of ``rig`` from the first reading and by the commands of a session of ``full``."""
+    """Outputs of ``rig``, (N + 1, 6) without noise, by a log's commands and from its first reading.
+
+    Parameters
+    ----------
+    full : the rig that made the log
+    """
     truth = session.run.states[0]
     state = _start(rig, read(full, truth), truth[:10], session.run.inlets[0])
     rest = Rest(state, (float(session.run.inlets[0, 0]), float(session.run.inlets[0, 1])), session.outlets)

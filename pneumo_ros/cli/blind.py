@@ -31,7 +31,7 @@ Only = Annotated[str, typer.Option(help="Only cases whose name contains this.")]
 def make(
     folder: Folder,
     set_name: Annotated[
-        str, typer.Option("--set", help="full (240 cases), full-0.2, full-0.1, dev, dev2 to dev5, ci.")
+        str, typer.Option("--set", help="full (280 cases), full-0.3, full-0.2, full-0.1, dev, dev2 to dev7, ci.")
     ] = "dev",
     workers: Workers = 1,
     scheduler: Scheduler = "",
@@ -40,7 +40,7 @@ def make(
 ) -> None:
     """Draw the cases of a set, write their logs, seal their labels.
 
-    Finished cases are kept: the same command goes on after an interruption. A case takes about 10 s of one core.
+    Finished cases are kept: the same command goes on after an interruption. A case takes about 12 s of one core.
     """
     from pneumo_ros.casemaker.plan import plan
     from pneumo_ros.cli.blind_work import make_case
