@@ -41,7 +41,7 @@ bench: $(READY)  ## Every speed, side by side with its limit
 WORKERS ?= 2
 BLIND ?= build/blind
 
-blind: $(READY)  ## The full blind check, 240 sealed cases (an hour on 2 cores); goes on where it was interrupted
+blind: $(READY)  ## The full blind check, 280 sealed cases (two hours on 2 cores); goes on where it was interrupted
 	$(BIN)/pneumo blind make $(BLIND) --set full --workers $(WORKERS)
 	$(BIN)/pneumo blind diagnose $(BLIND) --workers $(WORKERS)
 	$(BIN)/pneumo blind score $(BLIND) --output docs/blind-results.md
