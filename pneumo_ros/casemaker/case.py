@@ -5,72 +5,40 @@ from __future__ import annotations
 import json
 import math
 import shutil
-import zlib
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
-from functools import partial
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pneumo_ros.casemaker.budget import Budget, budget_of, true_logs
+from pneumo_ros.casemaker.bench import SEARCH_STEP, Bench, bench, refitted
+from pneumo_ros.casemaker.budget import true_logs
 from pneumo_ros.casemaker.catalogue import get
 from pneumo_ros.casemaker.curves import curve_of
 from pneumo_ros.casemaker.draw import drawn_rig, imperfect_rig, scenes
 from pneumo_ros.casemaker.form import STATED, drawn_form, sized_form
-from pneumo_ros.casemaker.gap_size import NUISANCE, Null, Observation, null_of, quick_gap, refit
+from pneumo_ros.casemaker.gap_size import Null, Observation, null_of
 from pneumo_ros.casemaker.log_file import write_log
 from pneumo_ros.casemaker.parameters import RicherRig
-from pneumo_ros.casemaker.plan import Planned
-from pneumo_ros.casemaker.refit import bounded_gap
-from pneumo_ros.casemaker.registry import Applied
+from pneumo_ros.casemaker.planned import Planned
 from pneumo_ros.casemaker.scene import Scene, Session, inside_bounds, observation, play
 from pneumo_ros.casemaker.simulate import STEP
+from pneumo_ros.casemaker.sizing import (
+    PART,
+    Graded,
+    combined,
+    graded_effects,
+    grown_sizes,
+    of_sizes,
+    rig_with_some,
+    true_budget,
+)
 from pneumo_ros.casemaker.trim import NoRestError
-from pneumo_ros.plant.half_car import HalfCar
-from pneumo_ros.plant.trim import nominal_half_car
-from pneumo_ros.rig import Quantity, Rig, load_rig
+from pneumo_ros.rig import Quantity, Rig
 
-Logs = NDArray[np.float64]
 LOGS = ("fit", "holdout", "edit")
 EPOCH_NS = 1_760_900_000_000_000_000
-GRADE_TOLERANCE = 0.04  # relative
-QUICK_TRIES, CAREFUL_TRIES = 5, 9
-ROUGH_TOLERANCE = 0.2  # of the grade of one of several effects
-PART, GROWTH = 0.03, 1.7  # smallest part of what the refit leaves that one of several holds; else it grows by this
 DRAWS, ACTS = 4, 0.5  # draws at most; share of the grade that each effect must reach alone
-SEARCH_STEP = 0.5e-3  # s, of the richer rig while a size is searched
-RULER_STEP = 1e-3  # s: RK4 then errs by less than a third of the sensor noise, on both sides of the ratio
-
-
-@dataclass(frozen=True)
-class Bench:
-    """What every case shares: the nominal rig and its plant, the ruler of the grades."""
-
-    nominal: Rig
-    car: HalfCar
-    references: tuple[float, float]
-
-
-def bench() -> Bench:
-    """The nominal rig that ships with the package."""
-    nominal = load_rig()
-    car, trim = nominal_half_car(nominal)
-    return Bench(nominal, replace(car, step=RULER_STEP), trim.pressures)
-
-
-@dataclass(frozen=True)
-class Graded:
-    """An effect at the size that meets its grade, as far as a sane size can."""
-
-    size: float
-    gap: float
-    ratio: float
-    weakest: float  # smallest ratio of one of its effects alone to its grade
-    sizes: tuple[float, ...]
-    applied: tuple[Applied, ...]
 
 
 def made(case: Planned, folder: Path, labels: Path) -> Path:
@@ -135,13 +103,13 @@ def _drawn(case: Planned, draw: int, on: Bench) -> tuple[dict[str, Any], list[Se
     if case.form:
         stated = STATED
         real, form_error = _formed(real, fit, held, null, np.random.default_rng([effect_seed, 1]), on)
-    graded = _graded(case, real, fit, null, effect_seed, on)
+    graded = graded_effects(case, real, fit, null, effect_seed, on)
     for _ in range(3 if case.budgeted and len(case.effects) > 1 else 0):
-        grown = _grown(case, real, graded, effect_seed, (fit, held), true_logs(sigmas), on)
+        grown = grown_sizes(case, real, graded, effect_seed, (fit, held), true_logs(sigmas), on)
         if grown == graded.sizes:
             break
-        graded = _of_sizes(case, real, grown, graded.weakest, fit, null, effect_seed, on)
-    rig, road_gain = _combined(real, graded.applied)
+        graded = of_sizes(case, real, grown, graded.weakest, fit, null, effect_seed, on)
+    rig, road_gain = combined(real, graded.applied)
     held, shown, held_floor = _telling(held, real, rig, road_gain, 0.5 * case.grade, on, step)
     three = (fit, held, edit)
     sessions = [play(rig, on.nominal, scene, on.car.surface, road_gain) for scene in three]
@@ -183,10 +151,10 @@ def _add_budget(
 ) -> None:  # fmt: skip
     """Write each effect's family, law, true shares and curve into the label."""
     sizes = graded.sizes
-    budget = _budget(case, real, sizes, seed, logs, true_logs(label["tolerances_sigma"]), on)
+    budget = true_budget(case, real, sizes, seed, logs, true_logs(label["tolerances_sigma"]), on)
 
     def rig_with(members: frozenset[int]) -> RicherRig:
-        return _with_some(case, real, sizes, seed, members)
+        return rig_with_some(case, real, sizes, seed, members)
 
     everyone = frozenset(range(len(case.effects)))
     for i, (item, law) in enumerate(zip(label["truth"], case.laws, strict=True)):
@@ -201,24 +169,6 @@ def _add_budget(
         item["share_of_refit"] = item["share"] / total
     label["refit_share"] = budget.refit
     label["held_out"] = {"nominal": budget.nominal, "refit": budget.refitted, "complete": budget.complete}
-
-
-def _with_some(
-    case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int, members: frozenset[int]
-) -> RicherRig:
-    """The true rig with some of its effects."""
-    kept = sorted(members)
-    some = replace(case, effects=tuple(case.effects[i] for i in kept), laws=tuple(case.laws[i] for i in kept))
-    return _combined(real, _applied(some, real, tuple(sizes[i] for i in kept), seed))[0]
-
-
-def _budget(
-    case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int, logs: tuple[Session, Session], drawn: Logs,
-    on: Bench, orders: bool = True,
-) -> Budget:  # fmt: skip
-    seen = (observation(logs[0], on.nominal), observation(logs[1], on.nominal))
-    some: Callable[[frozenset[int]], RicherRig] = partial(_with_some, case, real, sizes, seed)
-    return budget_of(len(case.effects), some, logs, seen, drawn, on.car, on.car.surface, orders)
 
 
 def _config(nominal: Rig, scene: Scene, form: float) -> Rig:
@@ -250,150 +200,14 @@ def _telling(
     best: tuple[Scene, float, float] | None = None
     for gain in (1.0, 1.35, 1.8):
         scene = held if gain == 1.0 else replace(held, valves="steps", gain=gain * held.gain)
-        floor, start = _refitted(play(real, on.nominal, scene, on.car.surface, step=step), on)
-        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain, step), on, start)[0]
+        floor, start = refitted(play(real, on.nominal, scene, on.car.surface, step=step), on)
+        value = refitted(play(rig, on.nominal, scene, on.car.surface, road_gain, step), on, start)[0]
         if best is None or (math.isfinite(value) and value / floor > best[1] / best[2]):
             best = (scene, value, floor)
         if value / floor >= wanted:
             break
     assert best is not None  # the loop has run
     return best
-
-
-def _refitted(session: Session, on: Bench, start: Logs | None = None) -> tuple[float, Logs]:
-    """What the nominal structure leaves after the refit, and the refit's parameters; infinite if the rig ran away."""
-    seen = observation(session, on.nominal)
-    if not np.isfinite(seen.measured).all():
-        return math.inf, np.zeros(len(NUISANCE))
-    return refit(on.car, seen, start)
-
-
-def _applied(case: Planned, real: RicherRig, sizes: tuple[float, ...], seed: int) -> tuple[Applied, ...]:
-    out, rig = [], real
-    laws = case.laws or ("",) * len(case.effects)
-    for (name, side), law, size in zip(case.effects, laws, sizes, strict=True):
-        # By name: an effect is the same alone, where it is sized, and in a pair.
-        done = get(name, law).apply(rig, size, side, np.random.default_rng([seed, zlib.crc32(name.encode())]))
-        rig = done.rig
-        out.append(done)
-    return tuple(out)
-
-
-def _combined(real: RicherRig, applied: tuple[Applied, ...]) -> tuple[RicherRig, float]:
-    if not applied:
-        return real, 1.0
-    return applied[-1].rig, max(item.road_gain for item in applied)
-
-
-def _graded(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> Graded:
-    """Size each effect alone to the case's grade (so that in a pair both can be seen), then measure the whole."""
-    sizes, weakest = [], math.inf
-    for i, one in enumerate(case.effects):
-        grade = case.grades[i] if case.grades else case.grade
-        size, alone = case.size, grade
-        if size is None:
-            only = replace(case, effects=(one,), laws=case.laws[i : i + 1], grade=grade)
-            size, alone = _search(only, real, scene, null, seed, on)
-        sizes.append(size)
-        weakest = min(weakest, alone / grade)
-    return _of_sizes(case, real, tuple(sizes), weakest, scene, null, seed, on)
-
-
-def _of_sizes(
-    case: Planned, real: RicherRig, sizes: tuple[float, ...], weakest: float, scene: Scene, null: Null, seed: int,
-    on: Bench,
-) -> Graded:  # fmt: skip
-    """The effects together at their sizes, and how large the whole is."""
-    applied = _applied(case, real, sizes, seed)
-    rig, road_gain = _combined(real, applied)
-    value = null.gap
-    if applied:
-        value = _refitted(play(rig, on.nominal, scene, on.car.surface, road_gain), on, null.logs)[0]
-    return Graded(max(sizes, default=0.0), value, value / null.gap, weakest, sizes, applied)
-
-
-def _grown(
-    case: Planned, real: RicherRig, graded: Graded, seed: int, scenes: tuple[Scene, Scene], drawn: Logs, on: Bench
-) -> tuple[float, ...]:
-    """Sizes, larger for those of several effects that hold too little of the held-out gap."""
-    rig, road_gain = _combined(real, graded.applied)
-    logs = tuple(play(rig, on.nominal, scene, on.car.surface, road_gain, SEARCH_STEP) for scene in scenes)
-    if not all(np.isfinite(log.run.measured).all() for log in logs):
-        return graded.sizes
-    budget = _budget(case, real, graded.sizes, seed, (logs[0], logs[1]), drawn, on, orders=False)
-    total = sum(budget.shares)
-    return tuple(
-        min(1.0, GROWTH * size) if share < 1.3 * PART * total else size
-        for size, share in zip(graded.sizes, budget.shares, strict=True)
-    )
-
-
-def _search(case: Planned, real: RicherRig, scene: Scene, null: Null, seed: int, on: Bench) -> tuple[float, float]:
-    """Size whose refit gap is ``case.grade`` floors, and how many it is: the quick ruler finds the neighbourhood, the
-    refit decides.
-    """
-
-    step = SEARCH_STEP if case.budgeted else STEP
-
-    def ratio_at(size: float, careful: bool) -> float:
-        rig, road_gain = _combined(real, _applied(case, real, (size,), seed))
-        try:
-            session = play(rig, on.nominal, scene, on.car.surface, road_gain, step)
-        except NoRestError:
-            return math.inf
-        if case.budgeted and not careful:
-            seen = observation(session, on.nominal)
-            return bounded_gap(on.car, seen, null) / null.gap if np.isfinite(seen.measured).all() else math.inf
-        return _left(session, null, on, careful) / null.gap
-
-    first = min(0.02 * case.grade, 0.5)
-    if case.budgeted and case.kind not in ("single", "unknown"):  # of several at once the shares are measured anyway
-        return _sized(lambda size: ratio_at(size, False), case.grade, first, QUICK_TRIES, ROUGH_TOLERANCE)
-    start, _ = _sized(lambda size: ratio_at(size, False), case.grade, first, QUICK_TRIES)
-    return _sized(lambda size: ratio_at(size, True), case.grade, start, CAREFUL_TRIES)
-
-
-def _sized(
-    ratio_at: Callable[[float], float], grade: float, start: float, tries: int, tolerance: float = GRADE_TOLERANCE
-) -> tuple[float, float]:
-    """(size, its ratio): false position on log(excess over the floor) against log(size)."""
-    wanted = 0.5 * math.log(grade**2 - 1.0)
-    low: tuple[float, float] | None = None
-    high: tuple[float, float] | None = None
-    size, best, closest = start, (start, 0.0), math.inf
-    for _ in range(tries):
-        ratio = ratio_at(size)
-        # As a ratio: an effect sized below its threshold is no nearer to its grade than one three times over.
-        off = abs(math.log(ratio / grade)) if 0.0 < ratio < math.inf else math.inf
-        if off < closest:
-            best, closest = (size, ratio), off
-        if off < tolerance or (size >= 1.0 and ratio < grade):
-            break
-        excess = 0.5 * math.log(max(ratio**2 - 1.0, 0.02)) if math.isfinite(ratio) else 10.0
-        if excess < wanted:
-            low = (math.log(size), excess)
-        else:
-            high = (math.log(size), excess)
-        size = _next_size(low, high, wanted)
-    return best
-
-
-def _left(session: Session, null: Null, on: Bench, careful: bool) -> float:
-    if careful:
-        return _refitted(session, on, null.logs)[0]
-    seen = observation(session, on.nominal)
-    return quick_gap(on.car, seen, null) if np.isfinite(seen.measured).all() else math.inf
-
-
-def _next_size(low: tuple[float, float] | None, high: tuple[float, float] | None, wanted: float) -> float:
-    if low is not None and high is not None:
-        share = (wanted - low[1]) / max(high[1] - low[1], 1e-9)
-        share = min(max(share, 0.15), 0.85)
-        return math.exp(low[0] + share * (high[0] - low[0]))
-    known = low if low is not None else high
-    assert known is not None  # the caller has just set one of them
-    step = min(max(wanted - known[1], -2.5), 2.5)
-    return min(1.0, math.exp(known[0] + 1.1 * step))
 
 
 def _truth(case: Planned, graded: Graded) -> list[dict[str, Any]]:

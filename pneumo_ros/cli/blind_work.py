@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pneumo_ros import __version__
 from pneumo_ros.casemaker.case import made
-from pneumo_ros.casemaker.plan import Planned
+from pneumo_ros.casemaker.planned import Planned
 
 
 def make_case(item: tuple[Planned, str]) -> None:

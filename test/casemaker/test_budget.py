@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from pneumo_ros.casemaker import budget as b
-from pneumo_ros.casemaker.case import bench, simulated
+from pneumo_ros.casemaker.bench import bench
+from pneumo_ros.casemaker.case import simulated
 from pneumo_ros.casemaker.curves import curve_of
 from pneumo_ros.casemaker.form import STATED, WANTED
 from pneumo_ros.casemaker.gap_size import NUISANCE
 from pneumo_ros.casemaker.laws import slots
 from pneumo_ros.casemaker.open_loop import shown
 from pneumo_ros.casemaker.parameters import RicherRig, richer_rig
-from pneumo_ros.casemaker.plan import Planned
+from pneumo_ros.casemaker.planned import Planned
 from pneumo_ros.casemaker.registry import at_ends, in_frame, with_law
 from pneumo_ros.casemaker.scene import Scene, Session, observation, play
 

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumo_ros.casemaker.case import bench, made, simulated
+from pneumo_ros.casemaker.bench import bench
+from pneumo_ros.casemaker.case import made, simulated
 from pneumo_ros.casemaker.draw import WIDEST, drawn_rig, scenes
 from pneumo_ros.casemaker.excitation import ROADS
 from pneumo_ros.casemaker.log_file import write_log
-from pneumo_ros.casemaker.plan import Planned, plan
+from pneumo_ros.casemaker.plan import plan
+from pneumo_ros.casemaker.planned import Planned
 from pneumo_ros.casemaker.scene import PERIOD, SAMPLES
 from pneumo_ros.log.reading import read_log
 

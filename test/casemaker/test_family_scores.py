@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from pneumo_ros.casemaker.catalogue import get, known_effects, outside_all
-from pneumo_ros.casemaker.plan import MIXTURES, plan
+from pneumo_ros.casemaker.mixture import MIXTURES
+from pneumo_ros.casemaker.plan import plan
 from pneumo_ros.casemaker.scoring import families as f
 from pneumo_ros.casemaker.scoring.intervals import Share
 from pneumo_ros.casemaker.scoring.metrics import Case

@@ -7,7 +7,7 @@ import pytest
 from helpers.folders import PACKAGE
 
 from pneumo_ros.casemaker import catalogue, contact, registry
-from pneumo_ros.casemaker.case import bench
+from pneumo_ros.casemaker.bench import bench
 from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING, Controller
 from pneumo_ros.casemaker.excitation import ROADS, road, valve_steps
 from pneumo_ros.casemaker.gap_size import free_run, gap, refit

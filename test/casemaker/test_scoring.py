@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from pneumo_ros.casemaker.catalogue import known_effects
-from pneumo_ros.casemaker.plan import MIXTURES, SETS, plan
+from pneumo_ros.casemaker.mixture import MIXTURES
+from pneumo_ros.casemaker.plan import SETS, plan
 from pneumo_ros.casemaker.scoring import metrics as m
 from pneumo_ros.casemaker.scoring.baselines import applied
 from pneumo_ros.casemaker.scoring.calibration import expected_error, risk_coverage

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pneumo_ros.casemaker.plan import GRADES
+from pneumo_ros.casemaker.planned import GRADES
 from pneumo_ros.casemaker.scoring.intervals import Share, share
 from pneumo_ros.casemaker.scoring.results import Found
 
