@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.casemaker.controller import LEVELLING
 from pneumo_ros.casemaker.derivative import FRONT, HOSE, REAR, SPOOL, TANK, inlet_flow
+from pneumo_ros.casemaker.laws.slots import SUPPLY
 from pneumo_ros.casemaker.parameters import RicherRig
 from pneumo_ros.casemaker.scene import PERIOD, Session
 from pneumo_ros.casemaker.simulate import Rest, initial_state, sense, simulate
@@ -25,11 +26,18 @@ def shown(rig: RicherRig, full: RicherRig, session: Session, surface: AreaSurfac
     """
     truth = session.run.states[0]
     state = _start(rig, read(full, truth), truth[:10], session.run.inlets[0])
+    if _supplied(rig) == _supplied(full):  # a sticking regulator may rest anywhere in its band: where it really was
+        state[TANK], state[HOSE] = truth[TANK], truth[HOSE]
     rest = Rest(state, (float(session.run.inlets[0, 0]), float(session.run.inlets[0, 1])), session.outlets)
     none = np.zeros((len(session.time), 6))
     run = simulate(prepared(rig, rest), rest, session.road, none[:, :2], none, surface, LEVELLING, PERIOD,
                    given=session.run.inlets, step=STEP)  # fmt: skip
     return run.measured
+
+
+def _supplied(rig: RicherRig) -> tuple[object, ...]:
+    frame = rig.frame
+    return frame.tank_volume, frame.regulator, frame.supply_pressure, tuple(x for x in rig.laws if x.row == SUPPLY)
 
 
 def read(rig: RicherRig, state: NDArray[np.float64]) -> NDArray[np.float64]:

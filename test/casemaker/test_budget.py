@@ -45,10 +45,11 @@ def test_true_logs_are_the_rulers_parameters() -> None:
     assert logs.max() == pytest.approx(np.log(1.01))
 
 
-def test_a_rig_driven_by_its_own_log_repeats_it() -> None:
+@pytest.mark.parametrize("supply", [(2, 1e10, 5e-6), (3, 1e-7, 8e3, 0.01)], ids=["hose", "sticking_regulator"])
+def test_a_rig_driven_by_its_own_log_repeats_it(supply: tuple[int, float, float]) -> None:
     rig = in_frame(at_ends(RICHER, "front", sprung_offset=1e-3, pressure_scale=1.02, leak=2e-13, open_energy=0.3),
                    tank_volume=1e-3, regulator=6e-8)  # fmt: skip
-    rig = with_law(with_law(rig, "rear", slots.FRICTION, 4, 4.0, 3e-4), None, slots.SUPPLY, 2, 1e10, 5e-6)
+    rig = with_law(with_law(rig, "rear", slots.FRICTION, 4, 4.0, 3e-4), None, slots.SUPPLY, *supply)
     session = play(rig, ON.nominal, SCENES[0], ON.car.surface)
     seen = observation(session, ON.nominal)
     left = seen.measured - shown(rig, rig, session, ON.car.surface)
