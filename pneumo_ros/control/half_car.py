@@ -46,6 +46,7 @@ VARIANTS: dict[str, tuple[str, bool, bool]] = {  # law, dA/dt fed forward, outle
 }
 CONTROLLERS = ("passive", *VARIANTS)
 PROFILE = "profile"  # no controller: a table of openings is played, see pneumo_ros.control.profile
+HEAVE_REFERENCE, PITCH_REFERENCE = 0, 3  # places in the controller's state of what heave and pitch follow
 TELEMETRY_NAMES = ("surface_heave", "surface_pitch", "inlet_front_unclipped", "inlet_rear_unclipped")
 
 PARAMETERS: tuple[Parameter, ...] = (
@@ -157,9 +158,9 @@ class Controller:
         """
         state = np.zeros(8)
         if estimate is None:
-            state[0], state[3] = self.law.target_heave, self.law.target_pitch
+            state[HEAVE_REFERENCE], state[PITCH_REFERENCE] = self.law.target_heave, self.law.target_pitch
         else:
-            state[0], state[3] = estimate[0], estimate[1]
+            state[HEAVE_REFERENCE], state[PITCH_REFERENCE] = estimate[0], estimate[1]
         return state
 
     def step(

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.control.half_car import PARAMETERS, PROFILE, build_controller
+from pneumo_ros.control.half_car import HEAVE_REFERENCE, PARAMETERS, PITCH_REFERENCE, PROFILE, build_controller
 from pneumo_ros.parameters import Value, settings
 from pneumo_ros.plant.trim import Trim, trim
 from pneumo_ros.rig import Rig
@@ -49,7 +49,7 @@ class ProfilePlayer:
         """State (8,): the heave and pitch it found (as references that nobody follows), sample 0."""
         state = np.zeros(8)
         if estimate is not None:
-            state[0], state[3] = estimate[0], estimate[1]
+            state[HEAVE_REFERENCE], state[PITCH_REFERENCE] = estimate[0], estimate[1]
         return state
 
     def placed(self, state: Array, number: int) -> Array:

@@ -31,7 +31,6 @@ from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topi
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.stages import continues
 from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import LoopTiming
 
@@ -197,10 +196,6 @@ class RigNode(Node):
         """Called when the session ends, after the last callback; what was published is delivered first."""
         for _, made in self._outgoing:
             made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
-
-    def continues(self, stamp_ns: int, last_ns: int) -> bool:
-        """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
-        return continues(stamp_ns, last_ns, self.period_ns)
 
     # -- health ----------------------------------------------------------------------------------------------------
 

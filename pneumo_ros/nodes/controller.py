@@ -7,13 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from rclpy.context import Context
 from std_msgs.msg import String
 
-from pneumo_ros.control.guard import guarded_step
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
-from pneumo_ros.control.profile import Commander, ProfilePlayer, build_commander
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder
@@ -21,6 +18,7 @@ from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
+from pneumo_ros.session.stages import ControllerStage, Course, advance
 
 PARAMETERS: tuple[Parameter, ...] = (
     *CONTROL_PARAMETERS,
@@ -33,7 +31,7 @@ WATCH_PERIOD = 0.004  # s between looks at the estimate's age, real time only
 
 
 class ControllerNode(RigNode):
-    """Thin shell over :mod:`pneumo_ros.control.half_car`, or over a valve profile that is played instead.
+    """Thin shell over :class:`~pneumo_ros.session.stages.ControllerStage`: a controller, or a valve profile.
 
     In real time it is the first of three watchdogs: without a fresh estimate it sends the safe command, whatever the
     driver and the board behind it do.
@@ -42,17 +40,16 @@ class ControllerNode(RigNode):
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         super().__init__("controller", PARAMETERS, context=context, overrides=overrides)
         self.rig = load_rig(self.values["rig"] or None)
-        self.controller = self._build()
-        # Load the compiled code now: the first period of a real-time session is as short as the others.
-        self.controller.step(self.controller.init(), np.full(16, 1e-3))
-        self.state: NDArray[np.float64] | None = None
+        self.stage = self._build()
+        self.stage.warm_up()
+        self.course: Course | None = None
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
         self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
         self._publish = self.publisher(topics.COMMAND).publish
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
-        self._last_ns = self._last_stamp = self._first_stamp = 0
+        self._last_ns = 0
         self._refused = 0
         self._stale = False
         safety = load_safety(self.values["safety"] or None)
@@ -61,37 +58,30 @@ class ControllerNode(RigNode):
             self.create_timer(WATCH_PERIOD, self._watch)
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
-    def _build(self) -> Commander:
-        values = {p.name: self.values[p.name] for p in CONTROL_PARAMETERS}
-        return build_commander(self.rig, self.period_ns * 1e-9, values, self.get_name())
+    def _build(self) -> ControllerStage:
+        return ControllerStage(self.rig, self.period_ns * 1e-9, self.values)
 
     def on_parameters(self, changed: Mapping[str, Value]) -> None:
         """Rebuild with the new gains; the state goes on, so a change is bumpless."""
-        self.controller = self._build()
+        self.stage = self._build()
 
     def publish_setup(self) -> None:
         """Parameters, and which profile is played."""
         super().publish_setup()
-        if isinstance(self.controller, ProfilePlayer):
-            played = {"node": self.get_name(), "valves": self.controller.profile.describe()}
+        if self.stage.profile is not None:
+            played = {"node": self.get_name(), "valves": self.stage.profile.describe()}
             self._setup.publish(String(data=yaml.safe_dump(played, sort_keys=False)))
 
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, estimate = self._read(data)
-        if self.state is None or not self.continues(stamp, self._last_stamp):
-            self.state = self.controller.init(estimate)
-        if isinstance(self.controller, ProfilePlayer):
-            self._first_stamp = self._first_stamp or stamp
-            self.state = self.controller.placed(self.state, round((stamp - self._first_stamp) / self.period_ns))
-        self._last_ns, self._last_stamp, self._stale = start, stamp, False
-        self.state, command, telemetry, refused = guarded_step(self.controller, self.state, estimate)
-        if refused:
+        self._last_ns, self._stale = start, False
+        self.course, output = advance(self.stage, self.course, stamp, estimate, self.period_ns)
+        if output.refused:
             self._say_refused(stamp)
-        self._publish(self._command(stamp, command))
+        self._publish(self._command(stamp, output.values))
         if self._steps % self.values["telemetry_every"] == 0:
-            shown = np.concatenate([telemetry, self.state[[0, 3]]])
-            self._publish_sliding(self._sliding(stamp, shown))
+            self._publish_sliding(self._sliding(stamp, output.telemetry))
         self._steps += 1
         self.timed(start)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +26,7 @@ from pneumo_ros.log.topics import Topic
 from pneumo_ros.log.writing import interface
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage, continues
+from pneumo_ros.session.stages import ControllerStage, Course, EstimatorStage, Stage, advance
 
 TABLES: dict[str, tuple[Parameter, ...]] = {"estimator": ESTIMATION_PARAMETERS, "controller": CONTROL_PARAMETERS}
 ALIASES = {"lambda": "pole"}  # the thesis's letter for the triple pole
@@ -154,10 +153,9 @@ def replay(log: Log, overrides: Overrides | None = None, rig: Rig | None = None)
 
 def warm_up(log: Log) -> None:
     """Load the compiled estimator and controller, so that a measured replay does not count it."""
-    rig, estimate = log.config or load_rig(), np.zeros(len(topics.ESTIMATE.names))
-    estimate[12:14] = np.full(2, 2e5)
-    for stage, sample in ((EstimatorStage(rig, 1e-3, {}), np.full(6, 2e5)), (ControllerStage(rig, 1e-3, {}), estimate)):
-        stage.step(stage.first(sample), sample)
+    rig = log.config or load_rig()
+    for stage in (EstimatorStage(rig, 1e-3, {}), ControllerStage(rig, 1e-3, {})):
+        stage.warm_up()
 
 
 def has(log: Log, topic: Topic) -> bool:
@@ -267,21 +265,16 @@ def _run(
     encode = JointEncoder(topic.frame_id, topic.names).encode
     stage, waiting = build(wanted.start), list(wanted.changes)
     values, telemetry = [], []
-    state: Any = None
-    last = -1
-    for i, stamp in enumerate(given.stamp_ns.tolist()):
-        sample = given.values[i]
-        if state is None or not continues(stamp, last, period_ns):
-            state = stage.first(sample)
-        state = stage.placed(state, round((stamp - int(given.stamp_ns[0])) / period_ns))
-        after, output = stage.step(state, sample)
+    course: Course | None = None
+    for stamp, sample in zip(given.stamp_ns.tolist(), given.values, strict=True):
+        after, output = advance(stage, course, stamp, sample, period_ns)
         if waiting and stamp >= waiting[0][0] - CHANGE_WINDOW_NS:
             said = recorded.get(stamp) if recorded is not None else None
             late = stamp >= waiting[0][0] + (CHANGE_WINDOW_NS if recorded is not None else 0)
             if late or (said is not None and said != encode(stamp, output.values.tolist())):
                 stage = build(waiting.pop(0)[1])
-                after, output = stage.step(state, sample)
-        state, last = after, stamp
+                after, output = advance(stage, course, stamp, sample, period_ns)
+        course = after
         values.append(output.values)
         telemetry.append(output.telemetry)
     shape = (len(values), -1)

@@ -1,7 +1,7 @@
 """Estimator and controller as a session runs them, without ROS: one input in, one message out, state explicit.
 
-The same pure steps in the same order as nodes/estimator.py and nodes/controller.py; a replayed session gives the
-recorded bytes again only because of that, and a test holds the two together.
+The nodes and stepped replay take the same :func:`advance`: a replayed session gives the recorded bytes again because
+nothing is written twice.
 """
 
 from __future__ import annotations
@@ -13,19 +13,25 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.control.guard import guarded_step
+from pneumo_ros.control.half_car import HEAVE_REFERENCE, PITCH_REFERENCE
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.control.profile import ProfilePlayer, build_commander
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig
+from pneumo_ros.road.valve_profile import ValveProfile
 
 
 class Output(NamedTuple):
-    """What a stage says at one sample: its message's values and, of the controller, its telemetry."""
+    """What a stage says at one sample: its message's values and, of the controller, its telemetry.
+
+    ``refused``: the command was not finite, and ``values`` are the trim in its place.
+    """
 
     values: Array
     telemetry: Array
+    refused: bool = False
 
 
 class Stage(Protocol):
@@ -40,6 +46,17 @@ class Stage(Protocol):
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
         """New state and output."""
 
+    def warm_up(self) -> None:
+        """Load the compiled code, so that the first period is as short as the others."""
+
+
+class Course(NamedTuple):
+    """How far a stage has come in a session: its state, and the stamps of its first and its last sample, ns."""
+
+    state: Any
+    first_ns: int
+    last_ns: int
+
 
 GAP_PERIODS = 10  # control periods without a sample after which estimator and controller begin afresh
 _NOTHING = np.empty(0)
@@ -48,6 +65,23 @@ _NOTHING = np.empty(0)
 def continues(stamp_ns: int, last_ns: int, period_ns: int) -> bool:
     """Whether a sample follows the last one closely: not after a jump back (a replayed log) or a long gap."""
     return 0 <= stamp_ns - last_ns <= GAP_PERIODS * period_ns
+
+
+def advance(stage: Stage, course: Course | None, stamp_ns: int, given: Array, period_ns: int) -> tuple[Course, Output]:
+    """One sample of a session.
+
+    Parameters
+    ----------
+    course : how far the stage has come, or None before the first sample
+    stamp_ns : of the sample, ns
+    given : what the stage takes, SI
+    period_ns : control period, ns
+    """
+    first_ns = stamp_ns if course is None else course.first_ns
+    if course is None or not continues(stamp_ns, course.last_ns, period_ns):
+        course = Course(stage.first(given), first_ns, stamp_ns)
+    state, output = stage.step(stage.placed(course.state, round((stamp_ns - first_ns) / period_ns)), given)
+    return Course(state, first_ns, stamp_ns), output
 
 
 class EstimatorStage:
@@ -69,12 +103,22 @@ class EstimatorStage:
         state, estimate = self._estimator.step(state, given)
         return state, Output(estimate, _NOTHING)
 
+    def warm_up(self) -> None:
+        """One step from rest."""
+        self._estimator.step(self._estimator.init(np.zeros(6)), np.full(6, 2e5))
+
 
 class ControllerStage:
     """Estimate (16,) to command (4,), m2, and telemetry (6,) of /controller/sliding."""
 
     def __init__(self, rig: Rig, period: float, values: Mapping[str, Value]) -> None:
         self._controller = build_commander(rig, period, known(CONTROL_PARAMETERS, values), "controller")
+
+    @property
+    def profile(self) -> ValveProfile | None:
+        """The valve profile that is played, if no controller runs."""
+        player = self._controller
+        return player.profile if isinstance(player, ProfilePlayer) else None
 
     def first(self, given: Array) -> Any:
         """The reference starts where the estimate is."""
@@ -86,9 +130,16 @@ class ControllerStage:
         return player.placed(state, number) if isinstance(player, ProfilePlayer) else state
 
     def step(self, state: Any, given: Array) -> tuple[Any, Output]:
-        """One estimate; a command that is not finite is replaced by the trim, as in the node."""
+        """One estimate; a command that is not finite is replaced by the trim."""
         done = guarded_step(self._controller, state, given)
-        return done.state, Output(done.command, np.concatenate([done.telemetry, done.state[[0, 3]]]))
+        telemetry = np.empty(6)
+        telemetry[:4] = done.telemetry
+        telemetry[4], telemetry[5] = done.state[HEAVE_REFERENCE], done.state[PITCH_REFERENCE]
+        return done.state, Output(done.command, telemetry, done.refused)
+
+    def warm_up(self) -> None:
+        """One step from rest."""
+        self._controller.step(self._controller.init(), np.full(16, 1e-3))
 
 
 def known(table: Any, values: Mapping[str, Value]) -> dict[str, Value]:

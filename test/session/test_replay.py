@@ -74,11 +74,13 @@ def recorded(tmp_path_factory: pytest.TempPathFactory, context: Context) -> Log:
         SessionRecorderNode(context, {"output": str(path)}),
     ]
     controller = nodes[3]
-    timer = controller.create_timer(0.001, lambda: change() if controller._last_stamp > 1_600_000_000 else None)
 
     def change() -> None:
-        timer.cancel()
-        controller.set_parameters([Parameter("pole", value=NEW_POLE)])
+        if controller.course is not None and controller.course.last_ns > 1_600_000_000:
+            timer.cancel()
+            controller.set_parameters([Parameter("pole", value=NEW_POLE)])
+
+    timer = controller.create_timer(0.001, change)
 
     assert spin(nodes, StopRequest(), context) == 0
     for node in nodes:
