@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.rig.channels import channels_of_states
 
 OUTPUTS = 6
 DECIMATE = 5  # 100 Hz is enough to measure a misfit whose band ends at 25 Hz
@@ -92,7 +93,7 @@ def free_run(car: HalfCar, seen: Observation) -> NDArray[np.float64]:
     pitch = (first[0] - first[1]) / (a + b)
     start = np.array([first[0] - a * pitch, pitch, first[2], first[3], 0.0, 0.0, 0.0, 0.0, first[4], first[5]])
     x = car.simulate(start, seen.commands, seen.road, seen.period)
-    return np.column_stack([x[:, 0] + a * x[:, 1], x[:, 0] - b * x[:, 1], x[:, 2], x[:, 3], x[:, 8], x[:, 9]])
+    return np.column_stack(channels_of_states(x, a, b))
 
 
 def gap(model: NDArray[np.float64], seen: Observation) -> float:

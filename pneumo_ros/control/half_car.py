@@ -32,12 +32,13 @@ from pneumo_ros.control.reference_model import advance_reference, reference_jerk
 from pneumo_ros.errors import InputError
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, load_surface
-from pneumo_ros.plant.half_car import COMMAND_NAMES, HEAVE, PITCH, gas_of, unpack_gas
+from pneumo_ros.plant.half_car import gas_of, unpack_gas
 from pneumo_ros.plant.trim import Trim, trim
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import HEAVE, PITCH
 from pneumo_ros.units import CUBIC_INCH, INCH, SQUARE_INCH
 
-__all__ = ["COMMAND_NAMES", "CONTROLLERS", "PARAMETERS", "TELEMETRY_NAMES", "Controller", "build_controller"]
+__all__ = ["CONTROLLERS", "PARAMETERS", "TELEMETRY_NAMES", "Controller", "build_controller"]
 
 VARIANTS: dict[str, tuple[str, bool, bool]] = {  # law, dA/dt fed forward, outlets commanded
     **{law: (law, False, False) for law in LAWS},
@@ -166,7 +167,7 @@ class Controller:
     def step(
         self, state: NDArray[np.float64], estimate: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """New state (8,), command (4,) in m2 of COMMAND_NAMES, telemetry (4,) of :data:`TELEMETRY_NAMES`."""
+        """New state (8,), command (4,) of VALVES, m2, telemetry (4,) of :data:`TELEMETRY_NAMES`."""
         if self.name == "passive":
             return state, self.at_rest.command, np.zeros(4)
         surface = self.surface

@@ -18,6 +18,7 @@ from pneumo_ros.estimation.half_car import Estimator, Model, estimate_areas, est
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
 from pneumo_ros.plant.half_car import Body, HalfCar, derivative, simulate, substeps
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import sprung_points
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,8 @@ def close_loop(
 @njit(cache=True)
 def measure(x: NDArray[np.float64], body: Body) -> NDArray[np.float64]:
     """Exact measurement (6,) of a plant state (10,): sprung and unsprung points, m, pressures, Pa."""
-    return np.array([x[0] + body.front_arm * x[1], x[0] - body.rear_arm * x[1], x[2], x[3], x[8], x[9]])
+    front, rear = sprung_points(x[0], x[1], body.front_arm, body.rear_arm)
+    return np.array([front, rear, x[2], x[3], x[8], x[9]])
 
 
 @njit(cache=True, error_model="numpy")
@@ -111,10 +113,11 @@ def exact_kinematics(
     for order in range(2):
         i = 4 * order
         out[2 * order], out[2 * order + 1] = x[i], x[i + 1]
-        out[6 + 2 * order] = x[i] + a * x[i + 1] - x[i + 2]
-        out[7 + 2 * order] = x[i] - b * x[i + 1] - x[i + 3]
+        top_f, top_r = sprung_points(x[i], x[i + 1], a, b)
+        out[6 + 2 * order], out[7 + 2 * order] = top_f - x[i + 2], top_r - x[i + 3]
     out[4], out[5] = rates[4], rates[5]
-    out[10], out[11] = rates[4] + a * rates[5] - rates[6], rates[4] - b * rates[5] - rates[7]
+    top_f, top_r = sprung_points(rates[4], rates[5], a, b)
+    out[10], out[11] = top_f - rates[6], top_r - rates[7]
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,18 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from pneumo_ros.rig.channels import CHANNELS
 from pneumo_ros.units import INCH, PSI, SQUARE_INCH
 
-SENSORS = (
-    "sprung_front",
-    "sprung_rear",
-    "unsprung_front",
-    "unsprung_rear",
-    "front_pressure",
-    "rear_pressure",
-    "supply_pressure",
-)
-VALVES = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")
+SENSORS = (*CHANNELS, "supply_pressure")
 LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "in": INCH}
 GAUGE_UNITS = {"psig": PSI, "Pa_gauge": 1.0, "bar_gauge": 1e5}
 ABSOLUTE_UNITS = {"Pa": 1.0, "bar": 1e5, "psia": PSI}
@@ -100,7 +92,7 @@ class ValveCalibration:
 
 @dataclass(frozen=True)
 class Calibration:
-    """All sensors by :data:`SENSORS` name and all valves by :data:`VALVES` name."""
+    """All sensors by :data:`SENSORS` name and all valves by :data:`~pneumo_ros.rig.channels.VALVES` name."""
 
     name: str
     sensors: Mapping[str, SensorCalibration]

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pneumo_ros.daq.calibration import SENSORS, VALVES, Calibration
+from pneumo_ros.daq.calibration import SENSORS, Calibration
 from pneumo_ros.daq.frames import Hello
 from pneumo_ros.daq.scaling import input_step, output_step, volts_range
+from pneumo_ros.rig.channels import VALVES
 from pneumo_ros.units import ATMOSPHERE, INCH, PSI
 
 STROKE = 1.0 * INCH  # m, heights 1.2 to 2.2 in of the effective area table

@@ -14,7 +14,6 @@ from pneumo_ros.daq.calibration import (
     AREA_UNITS,
     DEFAULT,
     SENSORS,
-    VALVES,
     Calibration,
     SensorCalibration,
     ValveCalibration,
@@ -22,6 +21,7 @@ from pneumo_ros.daq.calibration import (
 )
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
+from pneumo_ros.rig.channels import VALVES
 
 SENSOR_KEYS = ("gain", "offset", "unit", "zero", "date", "residual", "interval", "source")
 VALVE_KEYS = ("gain", "offset", "unit", "source")

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from pneumo_ros.daq.calibration import SENSORS, Calibration, units_of
 from pneumo_ros.errors import InputError
-from pneumo_ros.plant.sensors import CHANNELS, read_channels
+from pneumo_ros.plant.sensors import read_channels
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import DISPLACEMENTS
 
 Readings = Mapping[str, tuple[float, float]]  # sensor -> (mean, standard deviation), SI
 REST = {"displacement": 1e-4, "pressure": 2e3}  # m and Pa: standard deviation above which the rig is not at rest
@@ -35,7 +36,7 @@ def references(what: str, rig: Rig) -> dict[str, float]:
     if what == "pressure":
         return dict.fromkeys(SENSORS[4:], rig.ambient_pressure.value)
     levelled = read_channels(trim(rig).state, rig.front_arm.value, rig.rear_arm.value)
-    return {channel: float(value) for channel, value in zip(CHANNELS[:4], levelled[:4], strict=True)}
+    return {channel: float(value) for channel, value in zip(DISPLACEMENTS, levelled[:4], strict=True)}
 
 
 def zero(calibration: Calibration, readings: Readings, what: str, rig: Rig) -> tuple[Calibration, dict[str, Point]]:

@@ -10,9 +10,9 @@ from typing import Any
 
 import yaml
 
-from pneumo_ros.daq.calibration import VALVES
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
+from pneumo_ros.rig.channels import VALVES
 
 QUANTITIES = (
     "front_height",

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from pneumo_ros.daq.calibration import SENSORS, VALVES, Calibration
+from pneumo_ros.daq.calibration import SENSORS, Calibration
 from pneumo_ros.daq.frames import INPUT_COUNT, OUTPUT_COUNT, Hello, InputRange, OutputRange
 from pneumo_ros.errors import InputError
+from pneumo_ros.rig.channels import VALVES
 
 MICRO = 1e-6
 

@@ -23,21 +23,15 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 from pneumo_ros.plant.air_spring import Gas
 from pneumo_ros.plant.half_car import Body
+from pneumo_ros.rig.channels import CHANNELS, PRESSURES
 
 Values = tuple[float, ...]
 Memory = Any  # what an effect keeps from one block of rows to the next; None before the first
 
 ENDS = ("front", "rear", "both")
 RIG = ("",)
-LVDTS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear")
-PRESSURES = ("front_pressure", "rear_pressure")
 PRESSURES_OR_BOTH = (*PRESSURES, "both")
-CHANNELS = LVDTS + PRESSURES
-SENSOR_PLACES = {
-    "front_pressure": "sensor:front_pressure",
-    "rear_pressure": "sensor:rear_pressure",
-    **{name: f"sensor:{name}" for name in LVDTS},
-}
+SENSOR_PLACES = {name: f"sensor:{name}" for name in CHANNELS}
 
 
 class Plant(NamedTuple):

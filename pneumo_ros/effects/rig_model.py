@@ -18,7 +18,6 @@ from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.effects.composition import CORRECTIONS, Compiled, Slot, compose
 from pneumo_ros.effects.configured import standing_effects
 from pneumo_ros.effects.contract import (
-    CHANNELS,
     SENSOR_PLACES,
     Effect,
     Inputs,
@@ -33,6 +32,7 @@ from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, G
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import CHANNELS, channels_of_states
 
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
 COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
@@ -399,11 +399,9 @@ def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
 
 def _channels(states: Array, body: Body) -> Array:
     """(..., 10) -> (..., 6): sprung points above the axles, axles, pressures."""
-    heave, pitch = states[..., 0], states[..., 1]
-    front, rear = heave + body.front_arm * pitch, heave - body.rear_arm * pitch
-    out = np.empty((*states.shape[:-1], 6))
-    out[..., 0], out[..., 1] = front, rear
-    out[..., 2:4], out[..., 4:6] = states[..., 2:4], states[..., 8:10]
+    out = np.empty((*states.shape[:-1], len(CHANNELS)))
+    for k, column in enumerate(channels_of_states(states, body.front_arm, body.rear_arm)):
+        out[..., k] = column
     return out
 
 

@@ -1,7 +1,8 @@
 """The half car's estimator: rates and accelerations from displacements, effective areas by least squares.
 
 Eqs. 6.91-6.93 with what the rig has besides: gauge pressure makes force (errata 7) and bushing damping acts between
-body and axle. Measurement order is that of :data:`MEASUREMENT_NAMES`, all values at one instant.
+body and axle. Measurements are those of
+:data:`~pneumo_ros.rig.channels.CHANNELS`, all values at one instant.
 """
 
 from __future__ import annotations
@@ -23,33 +24,6 @@ from pneumo_ros.units import GRAVITY, INCH
 HEIGHT_UNIT = 0.01  # m: the height correction is estimated in centimetres, which makes its regressor of the areas' size
 SLOPE_STEP = 1e-5  # m
 SMALLEST_SLOPE = 1.0 * INCH  # m2/m, i.e. 1 in2 per in: about a quarter of the surface's usual slope
-
-MEASUREMENT_NAMES = (
-    "sprung_front",
-    "sprung_rear",
-    "unsprung_front",
-    "unsprung_rear",
-    "pressure_front",
-    "pressure_rear",
-)
-ESTIMATE_NAMES = (
-    "heave",
-    "pitch",
-    "heave_rate",
-    "pitch_rate",
-    "heave_acceleration",
-    "pitch_acceleration",
-    "height_front",
-    "height_rear",
-    "height_rate_front",
-    "height_rate_rear",
-    "height_acceleration_front",
-    "height_acceleration_rear",
-    "pressure_front",
-    "pressure_rear",
-    "area_front",
-    "area_rear",
-)
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(
@@ -136,7 +110,9 @@ class Estimator:
     def step(
         self, state: EstimatorState, measurement: NDArray[np.float64]
     ) -> tuple[EstimatorState, NDArray[np.float64]]:
-        """Take in a measurement (6,), m and Pa; return new state and estimate (16,), :data:`ESTIMATE_NAMES`."""
+        """Take in a measurement (6,), m and Pa; return new state and estimate (16,), its columns in
+        :data:`~pneumo_ros.rig.channels.ESTIMATE_FIELDS`.
+        """
         derivatives, areas, gain, estimate = estimate_half_car(
             *state, measurement, self.gains, self.model, self.surface
         )

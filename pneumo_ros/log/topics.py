@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from pneumo_ros.rig.channels import CHANNELS, DISPLACEMENTS, ESTIMATE_FIELDS, ROADS, TRUTH_FIELDS, VALVES
+
 
 class Flow(Enum):
     """Quality of service of a topic (REP 2003), with the reason."""
@@ -61,12 +63,12 @@ DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 ROAD = Topic(
     "/road/profile", JOINT, "commanded road height and its rate under each axle", "road_profile", ("plant",),
-    frame_id="ground", fields=(("front", "m"), ("rear", "m")), rates=True,
+    frame_id="ground", fields=tuple((name, "m") for name in ROADS), rates=True,
 )  # fmt: skip
 DISPLACEMENT = Topic(
     "/rig/displacement", JOINT, "calibrated LVDTs, upwards from the ground datum, sprung points above each axle",
     "plant", ("estimator",), frame_id="ground",
-    fields=(("sprung_front", "m"), ("sprung_rear", "m"), ("unsprung_front", "m"), ("unsprung_rear", "m")),
+    fields=tuple((name, "m") for name in DISPLACEMENTS),
 )  # fmt: skip
 FRONT_PRESSURE = Topic(
     "/rig/front/pressure", PRESSURE, "front air spring, absolute", "plant", ("estimator",),
@@ -79,7 +81,7 @@ REAR_PRESSURE = Topic(
 COMMAND = Topic(
     "/valve/command", JOINT, "commanded orifice areas, held until the next", "controller", ("plant", "daq"),
     frame_id="manifold",
-    fields=(("front_inlet", "m2"), ("rear_inlet", "m2"), ("front_outlet", "m2"), ("rear_outlet", "m2")),
+    fields=tuple((name, "m2") for name in VALVES),
 )  # fmt: skip
 ESTIMATE = Topic(
     "/estimate/state",
@@ -88,24 +90,7 @@ ESTIMATE = Topic(
     "estimator",
     ("controller",),
     frame_id="ground",
-    fields=(
-        ("heave", "m"),
-        ("pitch_nose_up", "rad"),
-        ("heave_rate", "m/s"),
-        ("pitch_nose_up_rate", "rad/s"),
-        ("heave_acceleration", "m/s2"),
-        ("pitch_nose_up_acceleration", "rad/s2"),
-        ("front_height", "m"),
-        ("rear_height", "m"),
-        ("front_height_rate", "m/s"),
-        ("rear_height_rate", "m/s"),
-        ("front_height_acceleration", "m/s2"),
-        ("rear_height_acceleration", "m/s2"),
-        ("front_pressure", "Pa"),
-        ("rear_pressure", "Pa"),
-        ("front_area", "m2"),
-        ("rear_area", "m2"),
-    ),
+    fields=ESTIMATE_FIELDS,
 )
 SLIDING = Topic(
     "/controller/sliding",
@@ -124,15 +109,7 @@ SLIDING = Topic(
 )
 TRUTH = Topic(
     "/sim/truth", JOINT, "what the simulated rig really does (simulation only)", "plant", frame_id="ground",
-    fields=(
-        ("heave", "m"), ("pitch_nose_up", "rad"), ("unsprung_front", "m"), ("unsprung_rear", "m"),
-        ("heave_rate", "m/s"), ("pitch_nose_up_rate", "rad/s"),
-        ("unsprung_front_rate", "m/s"), ("unsprung_rear_rate", "m/s"),
-        ("front_pressure", "Pa"), ("rear_pressure", "Pa"),
-        ("heave_acceleration", "m/s2"), ("pitch_nose_up_acceleration", "rad/s2"),
-        ("front_area", "m2"), ("rear_area", "m2"),
-        ("front_tyre_force", "N"), ("rear_tyre_force", "N"),
-    ),
+    fields=TRUTH_FIELDS,
 )  # fmt: skip
 CLOCK = Topic(
     "/clock", "rosgraph_msgs/msg/Clock", "simulation time, lockstep only; the plant owns it", "plant",
@@ -163,10 +140,7 @@ READY = Topic(
 RAW = Topic(
     "/rig/raw", JOINT, "converter counts of every sample as they came, also before arming (hardware only)", "daq",
     frame_id="converter",
-    fields=(
-        ("sprung_front", "count"), ("sprung_rear", "count"), ("unsprung_front", "count"), ("unsprung_rear", "count"),
-        ("front_pressure", "count"), ("rear_pressure", "count"), ("supply_pressure", "count"),
-    ),
+    fields=tuple((name, "count") for name in (*CHANNELS, "supply_pressure")),
 )  # fmt: skip
 SUPPLY_PRESSURE = Topic(
     "/rig/supply/pressure", PRESSURE, "air supply, absolute (hardware only)", "daq",

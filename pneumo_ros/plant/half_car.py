@@ -1,7 +1,8 @@
 """The half car on two air springs (Eqs. 4.63-4.72, corrected by errata 1, 7, 8) and its compiled integrator.
 
-State (10): heave, pitch, unsprung front, unsprung rear [m, rad, m, m], their rates, front and rear spring pressure
-[Pa absolute]. All z are upwards from the ground datum; pitch is positive nose up.
+State (10), :data:`~pneumo_ros.rig.channels.STATE_FIELDS`: heave, pitch, unsprung front, unsprung rear [m, rad, m, m],
+their rates, front and rear spring pressure [Pa absolute]. All z are upwards from the ground datum; pitch is positive
+nose up.
 Inputs: commanded orifice areas (front inlet, rear inlet, front outlet, rear outlet) [m2], held over a period, and road
 height (front, rear) [m], linear over a period.
 """
@@ -27,26 +28,12 @@ from pneumo_ros.plant.air_spring import (
 )
 from pneumo_ros.plant.orifice import critical_ratio, flow_function
 from pneumo_ros.rig import LIMITS, Rig
+from pneumo_ros.rig.channels import sprung_points
 from pneumo_ros.units import GRAVITY, INCH
 
 BUMP_STOP_HEIGHT = 1.2 * INCH  # m, below it the stop pushes; not in the thesis: keeps every run bounded
 BUMP_STOP_STIFFNESS = 2e5  # N/m
 
-STATE_NAMES = (
-    "heave",
-    "pitch",
-    "unsprung_front",
-    "unsprung_rear",
-    "heave_rate",
-    "pitch_rate",
-    "unsprung_front_rate",
-    "unsprung_rear_rate",
-    "pressure_front",
-    "pressure_rear",
-)
-COMMAND_NAMES = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")
-HEAVE, PITCH, UNSPRUNG_FRONT, UNSPRUNG_REAR = range(4)
-PRESSURE_FRONT, PRESSURE_REAR = 8, 9
 DEFAULT_STEP = 0.5e-3  # s: RK4 within 5e-5 of the converged trajectory
 
 State = tuple[float, float, float, float, float, float, float, float, float, float]
@@ -188,10 +175,9 @@ def derivative(
 ) -> State:
     """Right-hand side of Eqs. 4.63-4.68."""
     heave, pitch, zuf, zur, heave_rate, pitch_rate, vuf, vur, pf, pr = x
-    hf = heave + body.front_arm * pitch - zuf
-    hr = heave - body.rear_arm * pitch - zur
-    hf_rate = heave_rate + body.front_arm * pitch_rate - vuf
-    hr_rate = heave_rate - body.rear_arm * pitch_rate - vur
+    zf, zr = sprung_points(heave, pitch, body.front_arm, body.rear_arm)
+    vf, vr = sprung_points(heave_rate, pitch_rate, body.front_arm, body.rear_arm)
+    hf, hr, hf_rate, hr_rate = zf - zuf, zr - zur, vf - vuf, vr - vur
     ff = spring_force(hf, hf_rate, pf, body.area_scale_front, body.damping_front, front.ambient_pressure, body, surface)
     fr = spring_force(hr, hr_rate, pr, body.area_scale_rear, body.damping_rear, rear.ambient_pressure, body, surface)
     return (

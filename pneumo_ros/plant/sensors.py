@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area
 from pneumo_ros.plant.half_car import HalfCar, derivative, unpack_body, unpack_gas
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import channels_of_states, sprung_points
 
-CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
 NOISE_BLOCK = 4096  # rows drawn at once; the sequence does not depend on it
 
 
 def read_channels(state: NDArray[np.float64], front_arm: float, rear_arm: float) -> tuple[float, ...]:
-    """Noise-free readings of :data:`CHANNELS` from a plant state (10,): m above the ground datum, Pa absolute."""
-    heave, pitch = state[0], state[1]
-    return (heave + front_arm * pitch, heave - rear_arm * pitch, state[2], state[3], state[8], state[9])
+    """Noise-free readings of :data:`~pneumo_ros.rig.channels.CHANNELS` from a plant state (10,), m and Pa absolute."""
+    return channels_of_states(state, front_arm, rear_arm)
 
 
 class NoiseSource:
@@ -54,9 +53,9 @@ def _truth(
     out = np.empty(16)
     out[:10] = x
     out[10], out[11] = rates[4], rates[5]
-    hf, hr = x[0] + body.front_arm * x[1] - x[2], x[0] - body.rear_arm * x[1] - x[3]
-    out[12] = body.area_scale_front * effective_area(hf, x[8] - front.ambient_pressure, surface)
-    out[13] = body.area_scale_rear * effective_area(hr, x[9] - rear.ambient_pressure, surface)
+    top_f, top_r = sprung_points(x[0], x[1], body.front_arm, body.rear_arm)
+    out[12] = body.area_scale_front * effective_area(top_f - x[2], x[8] - front.ambient_pressure, surface)
+    out[13] = body.area_scale_rear * effective_area(top_r - x[3], x[9] - rear.ambient_pressure, surface)
     out[14] = body.tyre_stiffness_front * (road[0] - x[2])
     out[15] = body.tyre_stiffness_rear * (road[1] - x[3])
     return out
@@ -65,7 +64,7 @@ def _truth(
 def truth(
     car: HalfCar, state: NDArray[np.float64], command: NDArray[np.float64], road: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(16,): the state, heave and pitch acceleration [m/s2, rad/s2], effective areas [m2], tyre forces [N, up].
+    """(16,) of :data:`~pneumo_ros.rig.channels.TRUTH_FIELDS`: state, accelerations, effective areas, tyre forces (up).
 
     Parameters
     ----------

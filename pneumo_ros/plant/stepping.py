@@ -26,7 +26,7 @@ class SteppedRig(Protocol):
         """State one period later: command (4,) m2, held; road (2, 2) m, front and rear, at its start and end."""
 
     def read(self, state: Any) -> tuple[float, ...]:
-        """What the sensors show without noise, (6,) of :data:`pneumo_ros.plant.sensors.CHANNELS`."""
+        """What the sensors show without noise, (6,) of :data:`pneumo_ros.rig.channels.CHANNELS`."""
 
     def plant_state(self, state: Any) -> Array:
         """(10,) of :mod:`pneumo_ros.plant.half_car`."""

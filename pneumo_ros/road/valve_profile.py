@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.rig.channels import VALVES
 from pneumo_ros.units import SQUARE_INCH
 
-VALVES = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")
 AREA_UNITS = {"m2": 1.0, "mm2": 1e-6, "in2": SQUARE_INCH}
 INTERPOLATIONS = ("held", "linear")
 ROUNDING = 1e-6  # relative: a largest opening written with few digits is still the largest opening
@@ -43,7 +43,7 @@ class ValveProfile:
     ----------
     path : file it was read from
     times : (N,) s, increasing
-    areas : (N, 4) m2, columns :data:`VALVES`
+    areas : (N, 4) m2, columns :data:`~pneumo_ros.rig.channels.VALVES`
     linear : straight between rows instead of held
     digest : SHA-256 of the file
     """

@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
+from pneumo_ros.rig.channels import ESTIMATED_AREAS, HEAVE, PITCH, TRUE_AREAS, TRUE_TYRE_FORCES
 from pneumo_ros.session.summary import Recorded, static_tyre_loads
 from pneumo_ros.units import DEGREE
 
@@ -38,7 +39,7 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
 
 
 def _motion(heave: Axes, pitch: Axes, session: Recorded, passive: Recorded | None) -> None:
-    for axis, column, scale in ((heave, 0, 1e3), (pitch, 1, 1.0 / DEGREE)):
+    for axis, column, scale in ((heave, HEAVE, 1e3), (pitch, PITCH, 1.0 / DEGREE)):
         if passive is not None:
             shown = (passive.truth[:, column] - passive.truth[0, column]) * scale
             axis.plot(passive.truth_time, shown, color=GREY, lw=0.9, label="valves at trim (simulated)")
@@ -56,7 +57,7 @@ def _motion(heave: Axes, pitch: Axes, session: Recorded, passive: Recorded | Non
 def _tyres(axis: Axes, session: Recorded) -> None:
     for side, (name, colour) in enumerate((("front", FRONT), ("rear", REAR))):
         if len(session.truth):
-            axis.plot(session.truth_time, session.truth[:, 14 + side], color=colour, lw=0.8, label=name)
+            axis.plot(session.truth_time, session.truth[:, TRUE_TYRE_FORCES[side]], color=colour, lw=0.8, label=name)
         axis.axhline(static_tyre_loads(session.rig)[side], color=colour, lw=0.7, ls=":", label=f"{name}, at rest")
     axis.axhline(0.0, color="k", lw=0.7)
     axis.set_ylabel("tyre force (N)\n0: contact lost")
@@ -78,9 +79,11 @@ def _orifices(axis: Axes, session: Recorded) -> None:
 
 def _area(axis: Axes, session: Recorded, side: int, name: str, colour: str) -> None:
     if len(session.estimate):
-        axis.plot(session.estimate_time, session.estimate[:, 14 + side] * 1e4, color=colour, lw=0.8, label="estimated")
+        shown = session.estimate[:, ESTIMATED_AREAS[side]] * 1e4
+        axis.plot(session.estimate_time, shown, color=colour, lw=0.8, label="estimated")
     if len(session.truth):
-        axis.plot(session.truth_time, session.truth[:, 12 + side] * 1e4, color="k", lw=1.0, ls="--", label="true")
-        low, high = session.truth[:, 12 + side].min() * 1e4, session.truth[:, 12 + side].max() * 1e4
+        true = session.truth[:, TRUE_AREAS[side]] * 1e4
+        axis.plot(session.truth_time, true, color="k", lw=1.0, ls="--", label="true")
+        low, high = true.min(), true.max()
         axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
     axis.set_ylabel(f"effective area,\n{name} (cm2)")

@@ -24,11 +24,10 @@ from pneumo_ros.log.reading import Log
 from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.rig.channels import CHANNELS, UNITS
 from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage
 
-CHANNELS = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
-UNITS = ("m", "m", "m", "m", "Pa", "Pa")
 Build = Callable[[Rig, float], SteppedRig]  # a rig and its period, s
 
 
@@ -39,7 +38,7 @@ class Rerun:
     Attributes
     ----------
     time : (N,) s from the first road sample used
-    channels : (N, 6) measured channels as simulated, :data:`CHANNELS`
+    channels : (N, 6) measured channels as simulated, :data:`~pneumo_ros.rig.channels.CHANNELS`
     command : (N, 4) m2
     recorded_time, recorded : (M,), (M, 6) the log's own, on the same clock
     notes : what was assumed

@@ -13,6 +13,14 @@ from pneumo_ros.log import topics
 from pneumo_ros.log.reading import Joint, Log, read_log
 from pneumo_ros.ride.comfort import Ride, judge
 from pneumo_ros.rig import Rig
+from pneumo_ros.rig.channels import (
+    ESTIMATED_AREAS,
+    TRUE_AREAS,
+    TRUE_HEAVE_ACCELERATION,
+    TRUE_PITCH_ACCELERATION,
+    TRUE_TYRE_FORCES,
+    spring_heights,
+)
 from pneumo_ros.units import GRAVITY
 
 SETTLED = 1.0  # s; figures of ride and estimate leave out the start before it
@@ -110,9 +118,9 @@ def area_error(session: Recorded) -> tuple[float, float] | None:
         return None
     keep = session.truth_time >= SETTLED
     errors = [
-        np.interp(session.truth_time[keep], session.estimate_time, session.estimate[:, 14 + side])
-        - session.truth[keep, 12 + side]
-        for side in (0, 1)
+        np.interp(session.truth_time[keep], session.estimate_time, session.estimate[:, estimated])
+        - session.truth[keep, true]
+        for estimated, true in zip(ESTIMATED_AREAS, TRUE_AREAS, strict=True)
     ]
     front, rear = (float(np.sqrt(np.mean(e**2))) if len(e) else float("nan") for e in errors)
     return front, rear
@@ -146,10 +154,11 @@ def _ride(session: Recorded) -> Ride | None:
     if len(x) < 2:
         return None
     rig = session.rig
-    heights = np.column_stack([
-        x[:, 0] + rig.front_arm.value * x[:, 1] - x[:, 2], x[:, 0] - rig.rear_arm.value * x[:, 1] - x[:, 3]
-    ])  # fmt: skip
-    return judge(x[:, 10], x[:, 11], x[:, 14:16], static_tyre_loads(rig), heights)
+    heights = np.column_stack(spring_heights(x, rig.front_arm.value, rig.rear_arm.value))
+    return judge(
+        x[:, TRUE_HEAVE_ACCELERATION], x[:, TRUE_PITCH_ACCELERATION], x[:, TRUE_TYRE_FORCES],
+        static_tyre_loads(rig), heights,
+    )  # fmt: skip
 
 
 def loop_timing(path: Path | str) -> dict[str, dict[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pneumo_ros.parameters import Value
-from pneumo_ros.plant.half_car import PITCH
+from pneumo_ros.rig.channels import PITCH
 from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, run
 from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas, verdict

@@ -18,6 +18,7 @@ from pneumo_ros.plant.half_car import HalfCar, half_car
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.ride.comfort import Ride, judge, rms
 from pneumo_ros.rig import Rig, load_rig
+from pneumo_ros.rig.channels import spring_heights
 from pneumo_ros.road import LENGTH_SCALE, make_road
 from pneumo_ros.thesis.comfort_limits import healey, janeway_use, permitted_hours, third_octaves, weighted_rms
 from pneumo_ros.thesis.models.conventional import Conventional, conventional_rates, simulate_conventional
@@ -163,9 +164,7 @@ def _motion(r: Run, settings: ThesisSettings) -> _Motion:
     _, car = nominal()
     body, after = car.body, settings.settled
     x = r.states[after:]
-    heights = np.column_stack([
-        x[:, 0] + body.front_arm * x[:, 1] - x[:, 2], x[:, 0] - body.rear_arm * x[:, 1] - x[:, 3]
-    ])  # fmt: skip
+    heights = np.column_stack(spring_heights(x, body.front_arm, body.rear_arm))
     tyres = np.array([body.tyre_stiffness_front, body.tyre_stiffness_rear]) * (r.road[after:] - x[:, 2:4])
     acceleration = np.gradient(r.states[:, 4:6], settings.period, axis=0)[after:]
     return _Motion(acceleration[:, 0], acceleration[:, 1], tyres, heights, _static_loads())
@@ -215,9 +214,7 @@ def _conventional(settings: ThesisSettings, name: str, seed: int) -> _Motion:
         conventional_rates(tuple(row), *heights, car)[4:6] for row, heights in zip(x[after:], road[after:], strict=True)
     ])  # fmt: skip
     x, road = x[after:], road[after:]
-    heights = np.column_stack([
-        x[:, 0] + car.front_arm * x[:, 1] - x[:, 2], x[:, 0] - car.rear_arm * x[:, 1] - x[:, 3]
-    ])  # fmt: skip
+    heights = np.column_stack(spring_heights(x, car.front_arm, car.rear_arm))
     static = _static_loads()
     tyres = np.array([car.tyre_stiffness_front, car.tyre_stiffness_rear]) * (road - x[:, 2:4]) + np.array(static)
     return _Motion(rates[:, 0], rates[:, 1], tyres, heights, static)
@@ -228,7 +225,7 @@ def _area_error(r: Run, settings: ThesisSettings) -> float:
     _, car = nominal()
     first = round(1.0 / settings.period)
     x, estimated = r.states[first:-1], r.estimates[first:, 14:]
-    heights = (x[:, 0] + car.body.front_arm * x[:, 1] - x[:, 2], x[:, 0] - car.body.rear_arm * x[:, 1] - x[:, 3])
+    heights = spring_heights(x, car.body.front_arm, car.body.rear_arm)
     ambient = car.front.ambient_pressure
     true = np.column_stack([
         [effective_area(h, p - ambient, car.surface) for h, p in zip(height, x[:, 8 + i], strict=True)]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pneumo_ros.daq.calibration import SENSORS, VALVES
+from pneumo_ros.daq.calibration import SENSORS
 from pneumo_ros.daq.calibration_check import check_calibration, resolution
 from pneumo_ros.daq.calibration_file import calibration_to_yaml, load_calibration, parse_calibration
 from pneumo_ros.daq.calibration_fit import fit_points, read_points
@@ -16,6 +16,7 @@ from pneumo_ros.daq.frames import Channel, InputRange, Valve
 from pneumo_ros.daq.scaling import check_map, input_scale, output_scale
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import load_rig
+from pneumo_ros.rig.channels import VALVES
 from pneumo_ros.units import ATMOSPHERE, INCH, PSI
 
 

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.diagnosis.signals.initial import Initial, estimate_initial
-from pneumo_ros.rig import Rig
+from pneumo_ros.rig import Rig, channels
 
-MEASURED = ("sprung_front", "sprung_rear", "unsprung_front", "unsprung_rear", "front_pressure", "rear_pressure")
-COMMANDS = ("front_inlet", "rear_inlet", "front_outlet", "rear_outlet")
-ROADS = ("front", "rear")
+MEASURED, COMMANDS, ROADS = channels.CHANNELS, channels.VALVES, channels.ROADS
 NO_VERDICT = "; no verdict."  # ends the sentence of a limitation that forbids one
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.contract import LVDTS, Effect, Memory, Values
+from pneumo_ros.effects.contract import Effect, Memory, Values
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.rig.channels import DISPLACEMENTS
 
 
 def outputs(
@@ -24,7 +25,7 @@ def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
 EFFECT = Effect(
     id="lvdt_offset",
     summary="an LVDT's zero is off",
-    sites=LVDTS,
+    sites=DISPLACEMENTS,
     places=(),
     parameters=(EffectParameter("offset", "m", -0.03, 0.03, 1e-3, size=True),),
     outputs=outputs,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.contract import LVDTS, Effect, Memory, Values
+from pneumo_ros.effects.contract import Effect, Memory, Values
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.rig.channels import DISPLACEMENTS
 
 
 def outputs(
@@ -24,7 +25,7 @@ def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
 EFFECT = Effect(
     id="lvdt_scale",
     summary="an LVDT's sensitivity is off",
-    sites=LVDTS,
+    sites=DISPLACEMENTS,
     places=(),
     parameters=(EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),),
     outputs=outputs,

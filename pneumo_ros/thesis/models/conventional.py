@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pneumo_ros.rig.channels import sprung_points
+
 State = tuple[float, float, float, float, float, float, float, float]
 
 
@@ -57,8 +59,8 @@ def damper_force(body_rate: float, axle_rate: float, damping: float, skyhook: fl
 def conventional_rates(x: State, road_front: float, road_rear: float, car: Conventional) -> State:
     """Right-hand side of Eqs. 3.1-3.4."""
     z, pitch, zf, zr, vz, rate, vf, vr = x
-    front, front_rate = z + car.front_arm * pitch, vz + car.front_arm * rate
-    rear, rear_rate = z - car.rear_arm * pitch, vz - car.rear_arm * rate
+    front, rear = sprung_points(z, pitch, car.front_arm, car.rear_arm)
+    front_rate, rear_rate = sprung_points(vz, rate, car.front_arm, car.rear_arm)
     ff = -car.stiffness_front * (front - zf) + damper_force(
         front_rate, vf, car.damping_front, car.skyhook, car.damping_max
     )
