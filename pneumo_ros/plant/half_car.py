@@ -160,6 +160,33 @@ def spring_force(
 
 
 @njit(cache=True, error_model="numpy", inline="always")
+def accelerations(
+    spring_front: float,
+    spring_rear: float,
+    tyre_front: float,
+    tyre_rear: float,
+    lift: float,
+    turn: float,
+    body: Body,
+) -> tuple[float, float, float, float]:
+    """Newton's law for body and axles (Eqs. 4.63-4.66): heave, m/s2, pitch, rad/s2, front and rear axle, m/s2.
+
+    Parameters
+    ----------
+    spring_front, spring_rear : N, positive upwards on the body
+    tyre_front, tyre_rear : N, positive upwards on the axle
+    lift, turn : what else acts on the body, N and N m nose up
+    body : masses and arms
+    """
+    return (
+        (spring_front + spring_rear + lift) / body.sprung_mass - GRAVITY,
+        (body.front_arm * spring_front - body.rear_arm * spring_rear + turn) / body.pitch_inertia,
+        (tyre_front - spring_front) / body.unsprung_mass_front - GRAVITY,
+        (tyre_rear - spring_rear) / body.unsprung_mass_rear - GRAVITY,
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
 def derivative(
     x: State,
     inlet_front: float,
@@ -180,22 +207,26 @@ def derivative(
     hf, hr, hf_rate, hr_rate = zf - zuf, zr - zur, vf - vuf, vr - vur
     ff = spring_force(hf, hf_rate, pf, body.area_scale_front, body.damping_front, front.ambient_pressure, body, surface)
     fr = spring_force(hr, hr_rate, pr, body.area_scale_rear, body.damping_rear, rear.ambient_pressure, body, surface)
+    tf = body.tyre_stiffness_front * (road_front - zuf)
+    tr = body.tyre_stiffness_rear * (road_rear - zur)
+    heave2, pitch2, front2, rear2 = accelerations(ff, fr, tf, tr, 0.0, 0.0, body)
     return (
         heave_rate,
         pitch_rate,
         vuf,
         vur,
-        (ff + fr) / body.sprung_mass - GRAVITY,
-        (body.front_arm * ff - body.rear_arm * fr) / body.pitch_inertia,
-        (body.tyre_stiffness_front * (road_front - zuf) - ff) / body.unsprung_mass_front - GRAVITY,
-        (body.tyre_stiffness_rear * (road_rear - zur) - fr) / body.unsprung_mass_rear - GRAVITY,
+        heave2,
+        pitch2,
+        front2,
+        rear2,
         pressure_rate(pf, hf, hf_rate, inlet_front, outlet_front, front),
         pressure_rate(pr, hr, hr_rate, inlet_rear, outlet_rear, rear),
     )
 
 
 @njit(cache=True)
-def _moved(x: State, k: State, dt: float) -> State:
+def moved(x: State, k: State, dt: float) -> State:
+    """x + dt k, of the ten states."""
     return (
         x[0] + dt * k[0],
         x[1] + dt * k[1],
@@ -257,10 +288,10 @@ def simulate(
             f0, r0 = rf + j * df, rr + j * dr
             fm, rm = f0 + 0.5 * df, r0 + 0.5 * dr
             k1 = derivative(x, u0, u1, u2, u3, f0, r0, body, front, rear, surface)
-            k2 = derivative(_moved(x, k1, 0.5 * dt), u0, u1, u2, u3, fm, rm, body, front, rear, surface)
-            k3 = derivative(_moved(x, k2, 0.5 * dt), u0, u1, u2, u3, fm, rm, body, front, rear, surface)
-            k4 = derivative(_moved(x, k3, dt), u0, u1, u2, u3, f0 + df, r0 + dr, body, front, rear, surface)
-            x = _moved(x, _combined(k1, k2, k3, k4), dt)
+            k2 = derivative(moved(x, k1, 0.5 * dt), u0, u1, u2, u3, fm, rm, body, front, rear, surface)
+            k3 = derivative(moved(x, k2, 0.5 * dt), u0, u1, u2, u3, fm, rm, body, front, rear, surface)
+            k4 = derivative(moved(x, k3, dt), u0, u1, u2, u3, f0 + df, r0 + dr, body, front, rear, surface)
+            x = moved(x, _combined(k1, k2, k3, k4), dt)
         for m in range(10):
             out[i + 1, m] = x[m]
     return out
