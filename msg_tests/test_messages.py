@@ -41,7 +41,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 @pytest.mark.parametrize("topic", topics.TOPICS, ids=lambda t: t.name)
 def test_type_exists(topic: topics.Topic) -> None:
-    assert message_class(topic.type) is not None
+    made = message_class(topic.type)
+    assert f"{made.__module__.split('.')[0]}/msg/{made.__name__}" == topic.type
     assert topic.meaning and topic.name.startswith("/")
 
 

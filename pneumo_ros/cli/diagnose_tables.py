@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.paths import finished
 from pneumo_ros.thesis.bench_tables import Judged, TableDiagnosis, diagnose_tables
 
 TITLES = {
@@ -58,11 +59,10 @@ def _sizes(judged: Judged) -> str:
 
 def _write(folder: Path, found: Mapping[str, TableDiagnosis]) -> Path:
     path = folder / FILE
-    part = path.with_name(FILE + ".part")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        part.write_text(json.dumps({name: one.to_json() for name, one in found.items()}, indent=1) + "\n")
-        part.replace(path)
+        with finished(path) as part:
+            part.write_text(json.dumps({name: one.to_json() for name, one in found.items()}, indent=1) + "\n")
     except OSError as error:
         raise InputError(
             f"cannot write the diagnosis ({error})", where=folder, remedy="choose another folder"

@@ -20,7 +20,7 @@ from pneumo_ros.daq.calibration import (
     units_of,
 )
 from pneumo_ros.errors import InputError
-from pneumo_ros.paths import share_file
+from pneumo_ros.paths import finished, share_file
 from pneumo_ros.rig.channels import VALVES
 
 SENSOR_KEYS = ("gain", "offset", "unit", "zero", "date", "residual", "interval", "source")
@@ -93,10 +93,8 @@ def calibration_to_yaml(calibration: Calibration) -> str:
 
 def save_calibration(calibration: Calibration, path: str | Path) -> None:
     """Write the YAML form; the name appears only when the file is complete."""
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    part.write_text(calibration_to_yaml(calibration), encoding="utf-8")
-    part.replace(target)
+    with finished(Path(path)) as part:
+        part.write_text(calibration_to_yaml(calibration), encoding="utf-8")
 
 
 def _mapping(entry: object, key: str, where: str) -> dict[str, Any]:

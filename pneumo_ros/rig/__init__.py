@@ -1,5 +1,7 @@
-"""The rig's parameters: typed, in SI, each with the tolerance its maker states, read from YAML."""
+"""The rig: its parameters with tolerances, read from YAML, and the names of its channels and state columns."""
 
-from pneumo_ros.rig.parameters import END_LIMITS, LIMITS, Limit, NamedEffect, Quantity, Rig, load_rig, parse_rig
+from pneumo_ros.rig.limits import END_LIMITS, LIMITS, Limit
+from pneumo_ros.rig.parameters import NamedEffect, Quantity, Rig
+from pneumo_ros.rig.reading import load_rig, parse_rig
 
 __all__ = ["END_LIMITS", "LIMITS", "Limit", "NamedEffect", "Quantity", "Rig", "load_rig", "parse_rig"]

@@ -1,21 +1,16 @@
 """The rig's parameters: typed, in SI, each with the tolerance its maker states.
 
-Nothing else in the package holds a number of the rig. ``config/rig.yaml`` is the nominal one; a session log
-carries its own copy under ``/rig/config``.
+Nothing else in the package holds a number of the rig.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import yaml
 
-from pneumo_ros.errors import InputError
-from pneumo_ros.paths import share_file
+from pneumo_ros.rig.limits import END_LIMITS, LIMITS, checked, limit_of
 
 
 @dataclass(frozen=True)
@@ -28,58 +23,6 @@ class Quantity:
     value: float
     std: float
     unit: str
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Unit and allowed range (inclusive) of a rig parameter, with what it means."""
-
-    unit: str
-    low: float
-    high: float
-    meaning: str
-
-
-LIMITS: dict[str, Limit] = {
-    "design_height": Limit("m", 0.0305, 0.0558, "air spring height both ends are levelled to"),
-    "sprung_mass": Limit("kg", 1.0, 1000.0, "body with payload"),
-    "pitch_inertia": Limit("kg m2", 0.01, 1000.0, "body's moment of inertia about its centre of mass"),
-    "front_arm": Limit("m", 0.01, 5.0, "centre of mass to front axle"),
-    "rear_arm": Limit("m", 0.01, 5.0, "centre of mass to rear axle"),
-    "unsprung_mass_front": Limit("kg", 0.05, 200.0, "front axle with wheel"),
-    "unsprung_mass_rear": Limit("kg", 0.05, 200.0, "rear axle with wheel"),
-    "tyre_stiffness_front": Limit("N/m", 100.0, 1e7, "front tyre, linear"),
-    "tyre_stiffness_rear": Limit("N/m", 100.0, 1e7, "rear tyre, linear"),
-    "bushing_damping": Limit("N s/m", 0.0, 1e5, "viscous damping between body and axle, each end"),
-    "polytropic_exponent": Limit("1", 1.0, 1.67, "of the air in spring and orifices"),
-    "supply_temperature": Limit("K", 200.0, 400.0, "stagnation temperature of the supply"),
-    "supply_pressure": Limit("Pa", 110e3, 3e6, "absolute"),
-    "ambient_pressure": Limit("Pa", 50e3, 110e3, "absolute"),
-    "outlet_area_front": Limit("m2", 0.0, 1e-4, "constant opening to the atmosphere"),
-    "outlet_area_rear": Limit("m2", 0.0, 1e-4, "constant opening to the atmosphere"),
-    "inlet_area_max": Limit("m2", 1e-8, 1e-3, "fully open inlet valve"),
-    "effective_area_scale": Limit("1", 0.2, 5.0, "factor on the effective area surface"),
-    "volume_scale": Limit("1", 0.2, 5.0, "factor on the air spring volume"),
-    "discharge_coefficient": Limit("1", 0.05, 2.0, "factor on every orifice area"),
-    "displacement_noise": Limit("m", 0.0, 0.01, "standard deviation of white LVDT noise"),
-    "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
-    "model_form": Limit(
-        "1", 0.0, 0.5, "share of each channel's std below which a difference is no effect to its maker"
-    ),
-}
-
-# What an end may have of its own where the rig has one number for both, or where the command is not what happens.
-END_LIMITS: dict[str, Limit] = {
-    f"{name}_{end}": limit
-    for end in ("front", "rear")
-    for name, limit in {
-        **{name: LIMITS[name] for name in
-           ("bushing_damping", "effective_area_scale", "volume_scale", "discharge_coefficient")},
-        "outlet_area": Limit("m2", 0.0, 1e-4, "opening that the commanded outlet area of ``rig:`` really gives"),
-        "volume_slope": Limit("1", 0.2, 5.0, "factor on dV/dh about the design height"),
-        "reference_pressure": Limit("Pa", 50e3, 3e6, "absolute; where the air has the supply's temperature (Eq. 4.17)"),
-    }.items()
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -174,8 +117,8 @@ class Rig:
         """
         changed = {}
         for name, value in values.items():
-            _limit_of(name, "with_values")
-            changed[name] = replace(getattr(self, name), value=_checked(name, value, "with_values"))
+            limit_of(name, "with_values")
+            changed[name] = replace(getattr(self, name), value=checked(name, value, "with_values"))
         return replace(self, **changed)
 
     def to_dict(self) -> dict[str, Any]:
@@ -196,184 +139,3 @@ class Rig:
         if self.effects:
             document["effects"] = [one.to_dict() for one in self.effects]
         return yaml.safe_dump(document, sort_keys=False)
-
-
-def load_rig(path: str | Path | None = None) -> Rig:
-    """Read a rig from YAML; without a path, the nominal rig that ships with the package.
-
-    Raises
-    ------
-    InputError
-        naming file, key, value, allowed range and remedy.
-    """
-    source = Path(path) if path is not None else share_file("config", "rig.yaml")
-    try:
-        text = source.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"cannot read the rig file ({error})", where=source, remedy="give a readable YAML file"
-        ) from error
-    return parse_rig(text, str(source))
-
-
-def parse_rig(text: str, where: str = "rig") -> Rig:
-    """Read a rig from YAML text; ``where`` names the text in errors.
-
-    A key that the text leaves out keeps the nominal value, except that a text without ``rig:`` is refused.
-    """
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
-    if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
-        raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
-    own = {key: document[key] for key in ("model_form",) if key in document}  # some write it beside the rig's numbers
-    rig = _from_mapping({**own, **document["rig"]}, where)
-    return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
-
-
-def _ends(entries: object, where: str) -> tuple[tuple[str, float], ...]:
-    if entries is None:
-        return ()
-    if not isinstance(entries, Mapping):
-        raise InputError(
-            "not a mapping", where=where, key="ends", value=entries, remedy="write ends: {name: {value: ...}}"
-        )
-    return tuple((str(name), _end(str(name), entry, where)) for name, entry in entries.items())
-
-
-def _end(name: str, entry: object, where: str) -> float:
-    limit = END_LIMITS.get(name)
-    if limit is None:
-        raise InputError("unknown value of an end", where=where, key=f"ends.{name}", allowed=", ".join(END_LIMITS))
-    if not isinstance(entry, Mapping) or "value" not in entry or entry.get("unit", limit.unit) != limit.unit:
-        raise InputError(
-            "needs a mapping with value and unit", where=where, key=f"ends.{name}", value=entry,
-            remedy=f"write {name}: {{value: ..., unit: {limit.unit}}}",
-        )  # fmt: skip
-    value = _number(f"ends.{name}", entry["value"], where)
-    if not limit.low <= value <= limit.high:
-        allowed = f"{limit.low:g} to {limit.high:g} {limit.unit}"
-        raise InputError("value out of range", where=where, key=f"ends.{name}", value=value, allowed=allowed)
-    return value
-
-
-def _effects(entries: object, where: str) -> tuple[NamedEffect, ...]:
-    if entries is None:
-        return ()
-    if not isinstance(entries, list):
-        raise InputError("not a list", where=where, key="effects", value=entries, remedy="write it as --save-rig does")
-    return tuple(_effect(k, entry, where) for k, entry in enumerate(entries))
-
-
-def _effect(number: int, entry: object, where: str) -> NamedEffect:
-    key = f"effects[{number}]"
-    parameters = entry.get("parameters") if isinstance(entry, Mapping) else None
-    if not isinstance(entry, Mapping) or "effect" not in entry or not isinstance(parameters, Mapping):
-        raise InputError(
-            "needs effect, site and parameters", where=where, key=key, value=entry,
-            remedy="write {effect: ID, site: front|rear|both|..., parameters: {name: value}}",
-        )  # fmt: skip
-    values = tuple((str(name), _number(f"{key}.parameters.{name}", v, where)) for name, v in parameters.items())
-    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("file") or ""))
-
-
-def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
-    known = {"name", *LIMITS}
-    for key in entries:
-        if key not in known:
-            _limit_of(str(key), where)
-    base = {"model_form": {"value": 0.0, "unit": "1"}}
-    base |= {} if known - set(base) <= set(entries) else _nominal_entries()
-    quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
-    name = str(entries.get("name", base.get("name", "unnamed")))
-    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
-
-
-def _nominal_entries() -> dict[str, Any]:
-    text = share_file("config", "rig.yaml").read_text(encoding="utf-8")
-    return dict(yaml.safe_load(text)["rig"])
-
-
-def _limit_of(name: str, where: str) -> Limit:
-    if name not in LIMITS:
-        raise InputError(
-            "unknown rig parameter",
-            where=where,
-            key=name,
-            allowed=", ".join(LIMITS),
-            remedy="correct the name or remove it",
-        )
-    return LIMITS[name]
-
-
-def _quantity(name: str, entry: object, where: str) -> Quantity:
-    limit = _limit_of(name, where)
-    if not isinstance(entry, Mapping) or "value" not in entry:
-        raise InputError(
-            "needs a mapping with value, std and unit",
-            where=where,
-            key=name,
-            value=entry,
-            remedy=f"write {name}: {{value: ..., std: ..., unit: {limit.unit}}}",
-        )
-    extra = set(entry) - {"value", "std", "unit"}
-    if extra:
-        raise InputError(
-            "unknown entry",
-            where=where,
-            key=f"{name}.{sorted(map(str, extra))[0]}",
-            allowed="value, std, unit",
-            remedy="remove it",
-        )
-    unit = str(entry.get("unit", limit.unit))
-    if unit != limit.unit:
-        raise InputError(
-            "wrong unit",
-            where=where,
-            key=f"{name}.unit",
-            value=unit,
-            allowed=limit.unit,
-            remedy="convert the value to SI",
-        )
-    std = _number(f"{name}.std", entry.get("std", 0.0), where)
-    if std < 0.0:
-        raise InputError(
-            "negative tolerance",
-            where=where,
-            key=f"{name}.std",
-            value=std,
-            allowed=">= 0",
-            remedy="give one standard deviation",
-        )
-    return Quantity(_checked(name, entry["value"], where), std, unit)
-
-
-def _checked(name: str, raw: object, where: str) -> float:
-    limit = _limit_of(name, where)
-    value = _number(name, raw, where)
-    if not limit.low <= value <= limit.high:
-        raise InputError(
-            "value out of range",
-            where=where,
-            key=name,
-            value=value,
-            allowed=f"{limit.low:g} to {limit.high:g} {limit.unit}",
-            remedy="check value and unit",
-        )
-    return value
-
-
-def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
-        raise InputError(
-            "not a finite number",
-            where=where,
-            key=key,
-            value=raw,
-            allowed="a finite number",
-            remedy="write it like 1.4 or 1.0e-05",
-        )
-    return float(raw)

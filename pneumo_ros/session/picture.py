@@ -9,7 +9,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from pneumo_ros.paths import finished
 from pneumo_ros.rig.channels import ESTIMATED_AREAS, HEAVE, PITCH, TRUE_AREAS, TRUE_TYRE_FORCES
 from pneumo_ros.session.summary import Recorded, static_tyre_loads
 from pneumo_ros.units import DEGREE
@@ -32,10 +34,14 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
             axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.margins(x=0)
     figure.suptitle(title)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
+    save_figure(figure, path)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as PNG and let it go."""
+    with finished(path) as part:
+        figure.savefig(part, dpi=110, format="png")
     plt.close(figure)
-    part.rename(path)
 
 
 def _motion(heave: Axes, pitch: Axes, session: Recorded, passive: Recorded | None) -> None:

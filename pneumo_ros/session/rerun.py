@@ -25,6 +25,7 @@ from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.rig.channels import CHANNELS, UNITS
+from pneumo_ros.session.picture import save_figure
 from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage
 
@@ -164,7 +165,4 @@ def draw_rerun(result: Rerun, path: Path, title: str) -> None:
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=10)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
-    plt.close(figure)
-    part.replace(path)
+    save_figure(figure, path)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pneumo_ros.log import topics
 from pneumo_ros.log.topics import Topic
 from pneumo_ros.rig import Rig
+from pneumo_ros.session.picture import save_figure
 from pneumo_ros.session.replay import Replayed, Track
 
 CAVEAT = "The plant does not react: measurements are the recorded ones; how the rig would have moved is not shown."
@@ -109,10 +110,7 @@ def draw_overlay(replayed: Replayed, path: Path, title: str) -> None:
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(f"{title}\n{CAVEAT}", fontsize=10)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
-    plt.close(figure)
-    part.replace(path)
+    save_figure(figure, path)
 
 
 def _draw(axis: Axes, found: Track, k: int, factor: float, start: int, label: str, colour: str, width: float) -> None:

@@ -37,8 +37,6 @@ from pneumo_ros.log.reading import read_log
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.rig import load_rig
 
-pytestmark = pytest.mark.realtime
-
 URL = re.compile(r"http://\S+")
 
 
@@ -161,6 +159,7 @@ def test_only_this_computer_and_this_page_or_the_token(log_path: Path) -> None:
         assert greeted(bare, bare.rstrip("/"), f"pneumo_token={token}")
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_a_log_plays_in_the_browser(log_path: Path) -> None:
     with served(str(log_path)) as (url, _), browser() as tab:
@@ -185,6 +184,7 @@ def line_with(words: str, stream: IO[str], seconds: float) -> bool:
     return found.wait(seconds)
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
     """One real session: the red button closes the valves, a gain changes, and the page stays when the session ends."""

@@ -182,7 +182,7 @@ def test_a_file_without_an_effect_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="defines no EFFECT"):
         load_library([bad])
     old = tmp_path / "old.py"
-    source = Path(str(LIBRARY["lvdt_offset"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
+    source = Path(str(LIBRARY["lvdt_scale"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
     old.write_text(source.replace(", values: Values, memory: Memory", ", values: Values"))
     with pytest.raises(InputError, match=r"hook of another form.*outputs\(outputs, period, channels, values, memory\)"):
         load_library([old])

@@ -103,7 +103,6 @@ def test_gaps_are_counted(tmp_path: Path) -> None:
     log = read_log(write(tmp_path / "a.mcap", without(contract_log(), "/rig/front/pressure", {50, 51, 52, 120})))
     topics = {t.name: t for t in inspect_log(log).topics}
     timing = topics["/rig/front/pressure"].timing
-    assert timing is not None
     assert timing.missing == 4 and [round(g.length / 2e-3) for g in timing.gaps] == [4, 2]
     assert timing.gaps[0].start_ns == T0 + 49 * PERIOD and timing.rate_hz == pytest.approx(500.0)
     whole = topics["/rig/rear/pressure"].timing

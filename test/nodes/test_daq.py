@@ -37,8 +37,6 @@ from pneumo_ros.log import topics
 from pneumo_ros.log.reading import Log, read_log
 from pneumo_ros.nodes.controller import ControllerNode
 
-pytestmark = pytest.mark.realtime
-
 RATE = 250  # Hz; five processes of a session and the emulator share the cores with everything else
 TRIES = 3  # sessions that a stall of this computer tripped before the scenario
 
@@ -93,6 +91,7 @@ def undisturbed(folder: Path, wanted: str | None, *arguments: str, duration: flo
     pytest.fail(f"this computer stalls too long for a real-time session, {TRIES} times in a row")
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_a_session_on_hardware_is_logged_like_a_simulated_one(tmp_path: Path) -> None:
     folder, _, _, log = undisturbed(tmp_path, None, "--fault", "drift:ppm=100", duration=4.0)
@@ -126,6 +125,7 @@ def test_a_session_on_hardware_is_logged_like_a_simulated_one(tmp_path: Path) ->
     assert any(s["node"] == "daq" and s["parameters"]["calibration"] == CALIBRATION for s in setups)
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_a_trip_ends_the_ride_and_the_log_says_why(tmp_path: Path) -> None:
     fault = "rail@1.5:channel=rear_pressure"
@@ -204,6 +204,7 @@ class Operator:
         assert all(result.successful for result in future.result().results)
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
     """Configure, zero, span, activate, e-stop, reset: without a session, as on the bench."""
@@ -248,6 +249,7 @@ def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
     assert json.dumps(yaml.safe_load(saved.read_text())["calibration"]["sensors"]["sprung_front"])
 
 
+@pytest.mark.realtime
 def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
     """The first watchdog, on monotonic time: within 50 ms of the last estimate the valves are asked to close."""
     context = Context()

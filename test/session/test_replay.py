@@ -46,8 +46,6 @@ from pneumo_ros.nodes.road_profile import RoadProfileNode  # noqa: E402
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode  # noqa: E402
 from pneumo_ros.nodes.spin import make_executor, spin  # noqa: E402
 
-pytestmark = pytest.mark.realtime
-
 DURATION = 2.0
 NEW_POLE = 14.0
 OUTPUTS = (topics.ESTIMATE, topics.COMMAND, topics.SLIDING)
@@ -264,6 +262,7 @@ class Listener:
         self.node.destroy_node()
 
 
+@pytest.mark.realtime
 def test_live_replay_feeds_a_running_estimator(recorded: Log, context: Context) -> None:
     """Play, pause, step, seek back: what the estimator says is what it said when the log was recorded."""
     truth = [recorded.records("/estimate/state").message(i) for i in range(recorded.topics["/estimate/state"].count)]
@@ -300,6 +299,7 @@ def test_live_replay_feeds_a_running_estimator(recorded: Log, context: Context) 
         listener.close()
 
 
+@pytest.mark.realtime
 def test_live_replay_from_the_command_line(recorded: Log) -> None:
     """To the end without a terminal; with one, keys act and `q` ends it."""
     result = run(app, [str(recorded.path), "--rate", "50", "--domain-id", str(own_domain())])

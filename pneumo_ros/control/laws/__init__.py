@@ -1,1 +1,1 @@
-"""Control laws: from the tracking error of one output to the third derivative wanted of it. One file a law."""
+"""Control laws: from the tracking error of one output to the third derivative wanted of it."""

@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-from pneumo_ros.arrays import Array
-from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
+from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect
 from pneumo_ros.effects.parameters import EffectParameter
-
-
-def outputs(
-    outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
-) -> tuple[Array, Memory]:
-    """What the sensor reports."""
-    outputs[:, channels] += values[0]
-    return outputs, None
-
-
-def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
-    """What was really there."""
-    measured[:, channels] -= values[0]
-    return measured
-
+from pneumo_ros.effects.sensors import shifted, unshifted
 
 EFFECT = Effect(
     id="pressure_offset",
@@ -27,6 +12,6 @@ EFFECT = Effect(
     sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(EffectParameter("offset", "Pa", -6e4, 6e4, 2e3, size=True),),
-    outputs=outputs,
-    undo=undo,
+    outputs=shifted,
+    undo=unshifted,
 )

@@ -17,10 +17,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.thesis.bench_tables.data import Bench, load_bench
 from pneumo_ros.thesis.bench_tables.laws import LAWS, NUISANCE, Law
 
+REACH = 3.0  # sigmas of its tolerance that a number of the bench may move
 MARGIN = 0.9  # a law with more parameters must leave less than this share of the gap that one with fewer leaves
 TRUST = {
     "frequency": 0.02,

@@ -1,0 +1,156 @@
+"""The rig from YAML: config/rig.yaml is the nominal one, a session log carries its own under ``/rig/config``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pneumo_ros.errors import InputError
+from pneumo_ros.paths import share_file
+from pneumo_ros.rig.limits import END_LIMITS, LIMITS, checked, limit_of, number
+from pneumo_ros.rig.parameters import NamedEffect, Quantity, Rig
+
+
+def load_rig(path: str | Path | None = None) -> Rig:
+    """Read a rig from YAML; without a path, the nominal rig that ships with the package.
+
+    Raises
+    ------
+    InputError
+        naming file, key, value, allowed range and remedy.
+    """
+    source = Path(path) if path is not None else share_file("config", "rig.yaml")
+    try:
+        text = source.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"cannot read the rig file ({error})", where=source, remedy="give a readable YAML file"
+        ) from error
+    return parse_rig(text, str(source))
+
+
+def parse_rig(text: str, where: str = "rig") -> Rig:
+    """Read a rig from YAML text; ``where`` names the text in errors.
+
+    A key that the text leaves out keeps the nominal value, except that a text without ``rig:`` is refused.
+    """
+    try:
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f" at line {mark.line + 1}" if mark is not None else ""
+        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
+    if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
+        raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
+    own = {key: document[key] for key in ("model_form",) if key in document}  # some write it beside the rig's numbers
+    rig = _from_mapping({**own, **document["rig"]}, where)
+    return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
+
+
+def _ends(entries: object, where: str) -> tuple[tuple[str, float], ...]:
+    if entries is None:
+        return ()
+    if not isinstance(entries, Mapping):
+        raise InputError(
+            "not a mapping", where=where, key="ends", value=entries, remedy="write ends: {name: {value: ...}}"
+        )
+    return tuple((str(name), _end(str(name), entry, where)) for name, entry in entries.items())
+
+
+def _end(name: str, entry: object, where: str) -> float:
+    limit = END_LIMITS.get(name)
+    if limit is None:
+        raise InputError("unknown value of an end", where=where, key=f"ends.{name}", allowed=", ".join(END_LIMITS))
+    if not isinstance(entry, Mapping) or "value" not in entry or entry.get("unit", limit.unit) != limit.unit:
+        raise InputError(
+            "needs a mapping with value and unit", where=where, key=f"ends.{name}", value=entry,
+            remedy=f"write {name}: {{value: ..., unit: {limit.unit}}}",
+        )  # fmt: skip
+    value = number(f"ends.{name}", entry["value"], where)
+    if not limit.low <= value <= limit.high:
+        allowed = f"{limit.low:g} to {limit.high:g} {limit.unit}"
+        raise InputError("value out of range", where=where, key=f"ends.{name}", value=value, allowed=allowed)
+    return value
+
+
+def _effects(entries: object, where: str) -> tuple[NamedEffect, ...]:
+    if entries is None:
+        return ()
+    if not isinstance(entries, list):
+        raise InputError("not a list", where=where, key="effects", value=entries, remedy="write it as --save-rig does")
+    return tuple(_effect(k, entry, where) for k, entry in enumerate(entries))
+
+
+def _effect(place: int, entry: object, where: str) -> NamedEffect:
+    key = f"effects[{place}]"
+    parameters = entry.get("parameters") if isinstance(entry, Mapping) else None
+    if not isinstance(entry, Mapping) or "effect" not in entry or not isinstance(parameters, Mapping):
+        raise InputError(
+            "needs effect, site and parameters", where=where, key=key, value=entry,
+            remedy="write {effect: ID, site: front|rear|both|..., parameters: {name: value}}",
+        )  # fmt: skip
+    values = tuple((str(name), number(f"{key}.parameters.{name}", v, where)) for name, v in parameters.items())
+    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("file") or ""))
+
+
+def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
+    known = {"name", *LIMITS}
+    for key in entries:
+        if key not in known:
+            limit_of(str(key), where)
+    base = {"model_form": {"value": 0.0, "unit": "1"}}
+    base |= {} if known - set(base) <= set(entries) else _nominal_entries()
+    quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
+    name = str(entries.get("name", base.get("name", "unnamed")))
+    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
+
+
+def _nominal_entries() -> dict[str, Any]:
+    text = share_file("config", "rig.yaml").read_text(encoding="utf-8")
+    return dict(yaml.safe_load(text)["rig"])
+
+
+def _quantity(name: str, entry: object, where: str) -> Quantity:
+    limit = limit_of(name, where)
+    if not isinstance(entry, Mapping) or "value" not in entry:
+        raise InputError(
+            "needs a mapping with value, std and unit",
+            where=where,
+            key=name,
+            value=entry,
+            remedy=f"write {name}: {{value: ..., std: ..., unit: {limit.unit}}}",
+        )
+    extra = set(entry) - {"value", "std", "unit"}
+    if extra:
+        raise InputError(
+            "unknown entry",
+            where=where,
+            key=f"{name}.{sorted(map(str, extra))[0]}",
+            allowed="value, std, unit",
+            remedy="remove it",
+        )
+    unit = str(entry.get("unit", limit.unit))
+    if unit != limit.unit:
+        raise InputError(
+            "wrong unit",
+            where=where,
+            key=f"{name}.unit",
+            value=unit,
+            allowed=limit.unit,
+            remedy="convert the value to SI",
+        )
+    std = number(f"{name}.std", entry.get("std", 0.0), where)
+    if std < 0.0:
+        raise InputError(
+            "negative tolerance",
+            where=where,
+            key=f"{name}.std",
+            value=std,
+            allowed=">= 0",
+            remedy="give one standard deviation",
+        )
+    return Quantity(checked(name, entry["value"], where), std, unit)
