@@ -62,7 +62,6 @@ setup(
         "view": ["bokeh>=3.4,<4"],
         "dev": [
             "pytest>=8",
-            "pytest-timeout>=2.3",
             "pytest-rerunfailures>=14",
             "hypothesis>=6.100",
             "ruff>=0.6",

@@ -143,7 +143,7 @@ def test_page_holds_scores_baselines_and_failures(tmp_path: Path) -> None:
     for word in ("top-1", "always none", "best training fit", "| e | none | none |", "Every failure (4)"):
         assert word in text
     assert next(tmp_path.glob("results-t-*.png")).stat().st_size > 5000
-    write_report(page, LABELS, FOUND, {"set": "later", "seed": 2, "software": "s"})
+    write_report(page, LABELS, FOUND, {"set": "later", "seed": 2, "software": "pneumo_ros 9.9"})
     both = page.read_text()
     assert both.index("Set `later`") < both.index("Set `t`")
     assert both.count("# The blind check") == 1
