@@ -1,4 +1,4 @@
-"""Reason codes of everything the driver reports; they appear on /rig/events, in the log and in docs/safety.md."""
+"""Reason codes of everything the driver reports; they appear on /rig/events and in the log."""
 
 from __future__ import annotations
 
