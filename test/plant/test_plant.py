@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.folders import ROOT
 from scipy.integrate import cumulative_simpson
 
 from pneumo_ros.plant.air_spring import (
@@ -25,6 +26,8 @@ from pneumo_ros.plant.trim import Trim, nominal_half_car
 from pneumo_ros.rig import load_rig
 from pneumo_ros.units import ATMOSPHERE, GRAVITY, INCH, PSI
 
+CHECKS = ROOT / "test" / "data" / "contract"
+
 
 @pytest.fixture(scope="module")
 def car_and_trim() -> tuple[HalfCar, Trim]:
@@ -35,33 +38,33 @@ def table(path: Path) -> np.ndarray:
     return np.genfromtxt(path, delimiter=",", skip_header=1)
 
 
-def test_effective_area_meets_the_check_values(shared: Path) -> None:
+def test_effective_area_meets_the_check_values() -> None:
     surface = load_surface()
-    rows = table(shared / "data" / "check_area.csv")
+    rows = table(CHECKS / "check_area.csv")
     ours = [effective_area(height, gauge, surface) for height, gauge, _ in rows]
     assert np.max(np.abs(ours - rows[:, 2])) < 2e-8
 
 
-def test_orifice_flow_meets_the_check_values(shared: Path) -> None:
-    rows = table(shared / "data" / "check_orifice_flow.csv")
+def test_orifice_flow_meets_the_check_values() -> None:
+    rows = table(CHECKS / "check_orifice_flow.csv")
     ours = np.array([mass_flow(area, up, down, 293.15, 1.4) for area, up, down, _ in rows])
     zero = rows[:, 3] == 0.0
     assert zero.any() and np.all(ours[zero] == 0.0)
     assert np.max(np.abs(ours[~zero] / rows[~zero, 3] - 1.0)) < 1e-5
 
 
-def test_static_state_meets_the_check_values(shared: Path, car_and_trim: tuple[HalfCar, Trim]) -> None:
+def test_static_state_meets_the_check_values(car_and_trim: tuple[HalfCar, Trim]) -> None:
     _, trim = car_and_trim
-    check = json.loads((shared / "data" / "check_static_state.json").read_text())
+    check = json.loads((CHECKS / "check_static_state.json").read_text())
     keys = ["heave_m", "pitch_rad", "unsprung_front_m", "unsprung_rear_m", "pressure_front_pa", "pressure_rear_pa"]
     ours = [*trim.state[:4], *trim.pressures, *trim.inlets]
     theirs = [check[key] for key in [*keys, "inlet_front_m2", "inlet_rear_m2"]]
     np.testing.assert_allclose(ours, theirs, rtol=1e-5)
 
 
-def test_trajectory_meets_the_check_values(shared: Path, car_and_trim: tuple[HalfCar, Trim]) -> None:
+def test_trajectory_meets_the_check_values(car_and_trim: tuple[HalfCar, Trim]) -> None:
     car, trim = car_and_trim
-    rows = table(shared / "data" / "check_trajectory.csv")
+    rows = table(CHECKS / "check_trajectory.csv.xz")
     commands = np.column_stack([rows[:-1, 1:3], np.tile(trim.outlets, (len(rows) - 1, 1))])
     ours = car.simulate(rows[0, 5:], commands, rows[:, 3:5], 1e-3)
     assert np.max(np.abs(ours - rows[:, 5:]).max(axis=0) / rows[:, 5:].std(axis=0)) < 1e-4
