@@ -19,6 +19,7 @@ ROLE = re.compile(r":(?:mod|class|func|meth|data|attr|exc):`~?([^`<]+)`", re.DOT
 DOTTED = re.compile(r"\bpneumo_ros(?:\.[A-Za-z_][A-Za-z0-9_]*)+")
 ROOMS = "docs|config|test|bench|examples|firmware|launch|nodes|session|log|daq|rig|effects|thesis"
 PATH = re.compile(rf"(?<![\w/.-])(?:{ROOMS})/[\w/.-]*\w\.(?:py|md|yaml|json|csv|png|c|h|txt)\b")
+FOLDER = re.compile(r"(?<![\w/.-])pneumo_ros/[\w/.]*\w/?")  # a room, or a file of it
 CONSTANT = re.compile(r"(?<![\w.])([a-z]\w+)\.([A-Z][A-Z0-9_]{2,})\b")  # fit.REACH: a module's last name and a constant
 
 
@@ -83,6 +84,7 @@ def broken(path: Path) -> list[str]:
 def stale(text: str) -> list[str]:
     """Files and constants that a text names and that do not exist."""
     files = [name for name in PATH.findall(text) if not (ROOT / name).exists() and not (PACKAGE / name).exists()]
+    files += [name for name in FOLDER.findall(text) if not (ROOT / name).exists()]
     constants = [f"{m}.{name}" for m, name in CONSTANT.findall(text) if not any(hasattr(o, name) for o in owners(m))]
     return files + constants
 

@@ -1,1 +1,1 @@
-"""The rig's physics: gas flow, air spring, quarter and half car. Knows nothing of ROS, files or ports."""
+"""The rig's physics: gas flow, air spring, half car, trim and sensors. Knows nothing of ROS, files or ports."""

@@ -1,1 +1,1 @@
-"""Session logs: reading, checking and repairing them, and playing them back."""
+"""The course of a session: stages of a control period, plan, supervision, replay, summary, picture and report."""
