@@ -27,6 +27,7 @@ from pneumo_ros.rig import Rig
 ROAD, VALVE, DISPLACEMENT = "/road/profile", "/valve/command", "/rig/displacement"
 PRESSURE = {"front_pressure": "/rig/front/pressure", "rear_pressure": "/rig/rear/pressure"}
 TOPIC_OF = {name: PRESSURE.get(name, DISPLACEMENT) for name in MEASURED}
+VALVES_OF = {"front_pressure": [0, 2], "rear_pressure": [1, 3]}  # columns of COMMANDS that fill and empty it
 MIN_DURATION = 2.0  # s: about four periods of the body
 SHORT_DURATION = 6.0  # s
 SLOWEST = 0.05  # s between samples of the fastest measured topic
@@ -56,7 +57,7 @@ def prepare(topics: Mapping[str, TopicData], rig: Rig, name: str = "log", origin
     grid, period = _grid(clean, name, limits)
     commands, road = _inputs(clean, grid, period, rig, name, limits)
     check_road_unit(road, name)
-    measured, weight, noise, stated = _measured(clean, grid, period, rig, name, limits)
+    measured, weight, noise, stated = _measured(clean, grid, commands, rig, name, limits)
     check_gauge(*_middles(measured, weight), rig, name)
     limits += all_limits(weight, measured, noise)
     return Signals(
@@ -231,8 +232,9 @@ def _middles(measured: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def _measured(
-    topics: Mapping[str, TopicData], grid: Array, period: float, rig: Rig, log: str, limits: list[Limitation]
+    topics: Mapping[str, TopicData], grid: Array, commands: Array, rig: Rig, log: str, limits: list[Limitation]
 ) -> tuple[Array, Array, Array, Array]:
+    period = float(grid[1] - grid[0])
     values, weights, noises, stated = [], [], [], []
     for channel in MEASURED:
         expected = rig.pressure_noise.value if channel in PRESSURE else rig.displacement_noise.value
@@ -243,7 +245,8 @@ def _measured(
         if data is not None and raw is not None and np.isfinite(raw).any():
             _count_nan(TOPIC_OF[channel], replace_name(data, key, channel), (channel,), limits)
             column, weight = sampled(data.stamp, raw, grid, period)
-        checked = check_channel(channel, column, weight, expected, log)
+        valves = commands[:, VALVES_OF[channel]] if channel in VALVES_OF else None
+        checked = check_channel(channel, column, weight, expected, log, valves)
         limits += checked.limitations if weight.any() else [missing(channel, _why_missing(channel, data, raw))]
         values.append(column)
         weights.append(checked.weight)
