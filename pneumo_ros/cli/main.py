@@ -7,12 +7,10 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from pneumo_ros import __version__
-from pneumo_ros.errors import PneumoError
+from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
@@ -36,12 +34,19 @@ class LazyGroup(TyperGroup):
         return list(VERBS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Import a verb; the modules import what is heavy inside their functions."""
-        if cmd_name not in VERBS:
-            return None
-        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{cmd_name}").app)
-        command.name = cmd_name
-        return command
+        """Name and summary of a verb, for the list of them: nothing is imported."""
+        return TyperCommand(cmd_name, help=VERBS[cmd_name]) if cmd_name in VERBS else None
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Import the verb that runs; the modules import what is heavy inside their functions."""
+        name = args[0]
+        if name.startswith("-"):
+            return super().resolve_command(ctx, args)
+        if name not in VERBS:
+            raise not_one_of("no such verb", name, VERBS, where="pneumo")
+        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{name}").app)
+        command.name = name
+        return name, command, args[1:]
 
 
 app = typer.Typer(
@@ -71,6 +76,9 @@ def main() -> None:
     try:
         app()
     except PneumoError as error:
+        from rich.console import Console
+        from rich.markup import escape
+
         Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]error:[/red] {escape(str(error))}")
         sys.exit(BAD_INPUT)
 

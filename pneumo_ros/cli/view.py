@@ -48,12 +48,13 @@ def view(
 
 def view_log(path: Path, host: str, port: int, token: str | None) -> None:
     """Play a log back; each browser tab has its own position."""
-    from pneumo_ros.dashboard.page import Page
-    from pneumo_ros.dashboard.server import serve
-    from pneumo_ros.dashboard.source import Playback
     from pneumo_ros.log.salvage import read_or_salvage
 
     log, remark = read_or_salvage(path)
+    from pneumo_ros.dashboard.page import Page
+    from pneumo_ros.dashboard.server import serve
+    from pneumo_ros.dashboard.source import Playback
+
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
     Playback(log)  # says what is wrong with the log before anybody waits for a page

@@ -10,6 +10,7 @@ import yaml
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.container import (
+    MAGIC,
     Contents,
     DamageError,
     check_magic,
@@ -52,6 +53,26 @@ def files_of(path: Path) -> list[Path]:
         if not file.exists():
             raise InputError(f"metadata.yaml lists {file.name}, which is not there", where=path)
     return files
+
+
+def check_log(path: Path) -> None:
+    """See in a moment that a log is there and is one, before what would read it is imported.
+
+    Raises
+    ------
+    InputError
+        as :func:`files_of`, or if a file begins with other bytes than MCAP's.
+    """
+    for file in files_of(path):
+        if file.suffix == ".zstd":
+            continue
+        try:
+            with file.open("rb") as stream:
+                check_magic(stream.read(len(MAGIC)), file)
+        except OSError as error:
+            raise InputError(
+                f"cannot read the log ({error.strerror})", where=file, remedy="check its rights"
+            ) from error
 
 
 def _listed(folder: Path) -> list[str]:

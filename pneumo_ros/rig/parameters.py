@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -116,6 +116,7 @@ class Rig:
 
     ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a
     simulation with them behaves as the rig that was diagnosed. Controllers and estimators believe the numbers.
+    ``assumed`` names the numbers that the text it was read from leaves out: the thesis's rig's stand in.
     """
 
     name: str
@@ -144,6 +145,7 @@ class Rig:
     model_form: Quantity = Quantity(0.0, 0.0, "1")
     ends: tuple[tuple[str, float], ...] = ()
     effects: tuple[NamedEffect, ...] = ()
+    assumed: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def diagnosed(self) -> bool:
@@ -289,7 +291,8 @@ def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
     base |= {} if known - set(base) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
-    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
+    left_out = tuple(key for key in LIMITS if key not in entries)
+    return Rig(name=name, assumed=left_out, **quantities)  # type: ignore[arg-type]  # ends, effects: their defaults
 
 
 def _nominal_entries() -> dict[str, Any]:
