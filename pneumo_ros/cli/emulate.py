@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from pneumo_ros.parameters import Value
+    from pneumo_ros.rig import Rig
     from pneumo_ros.road import Road
 
 app = typer.Typer(add_completion=False)
@@ -66,7 +67,7 @@ def emulate(
     tell_assumed(console, the_rig, rig)
     hello = board_identity(boot_id=round(time.time()) % 2**32, adc_bits=adc_bits, dac_bits=dac_bits)
     simulation = RigSimulation(
-        the_rig, _road(road, speed, seed, the_rig.wheelbase), hello, load_calibration(calibration),
+        the_rig, _road(road, speed, seed, the_rig), hello, load_calibration(calibration),
         SimulationSettings(seed, converter_noise), stepped_rig(the_rig, hello.sample_period_us * 1e-6),
     )  # fmt: skip
     say = lambda state: console.print(f"board: {state.name.lower()}")  # noqa: E731
@@ -85,7 +86,7 @@ def emulate(
         done.save(record)
 
 
-def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
+def _road(road: str, speed: float, seed: int, rig: Rig) -> Road:
     from pneumo_ros.road import build_road
 
     values: dict[str, Value]
@@ -95,7 +96,8 @@ def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
         values = {"kind": "file", "path": road}
     else:
         values = {"kind": road}
-    return build_road({**values, "speed_kmh": speed, "seed": seed}, wheelbase=wheelbase, where="--road")
+    given = {**values, "speed_kmh": speed, "seed": seed}
+    return build_road(given, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="--road")
 
 
 def _show_faults(console: Console) -> None:

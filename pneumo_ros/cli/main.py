@@ -1,8 +1,24 @@
+# ruff: noqa: E402
 """`pneumo`: verbs are imported only when asked for, so that `pneumo --help` is quick."""
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+from types import FrameType
+
+INTERRUPTED = 130  # exit code, as a shell says of Ctrl-C
+
+
+def _stopped(number: int = signal.SIGINT, frame: FrameType | None = None) -> None:
+    os.write(2, b"stopped by the user\n")
+    os._exit(INTERRUPTED)
+
+
+if __name__ == "__main__" or sys.argv[0].endswith("pneumo"):
+    signal.signal(signal.SIGINT, _stopped)  # first of all: nothing has begun that would have to end in order
+
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -46,7 +62,16 @@ class LazyGroup(TyperGroup):
             raise not_one_of("no such verb", name, VERBS, where="pneumo")
         command = typer.main.get_command(import_module(f"pneumo_ros.cli.{name}").app)
         command.name = name
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on a verb may have something to end
         return name, command, args[1:]
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb; Ctrl-C that it leaves to us is one line."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            print("stopped by the user", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 app = typer.Typer(

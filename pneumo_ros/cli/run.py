@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 FAILED = 1
+INTERRUPTED = 130  # as a shell says of Ctrl-C
+MIN_SAMPLES = 10  # fewer make no figures
 RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
 
@@ -214,7 +216,7 @@ def _check(values: Values, target: Path) -> Rig:
         standing_effects(rig, library_of(rig))
     _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
-    build_road(own, wheelbase=rig.wheelbase, where="road")
+    build_road(own, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="road")
     if target.suffix != ".mcap":
         raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
     if target.exists():
@@ -309,7 +311,22 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
             raise typer.Exit(FAILED) from error
         except KeyboardInterrupt:
             progress.stop()
-            console.print("stopped by the user; the log is finished")
+            _tell_stopped(console, target)
+
+
+def _tell_stopped(console: Console, target: Path) -> None:
+    """What became of the log when the user ended the session; an end before the first sample leaves none."""
+    from pneumo_ros.log import topics
+    from pneumo_ros.log.reading import read_log
+
+    if not target.exists():
+        console.print("stopped by the user before the session began: there is no log")
+        raise typer.Exit(INTERRUPTED)
+    found = read_log(target, [topics.DISPLACEMENT.name]).topics.get(topics.DISPLACEMENT.name)
+    if found is None or found.count < MIN_SAMPLES:
+        console.print(f"stopped by the user before there was anything to show; the log holds the start: {target}")
+        raise typer.Exit(INTERRUPTED)
+    console.print("stopped by the user; the log is finished")
 
 
 def _save_what_is_left(target: Path) -> None:
@@ -335,14 +352,19 @@ def _report(console: Console, target: Path, values: Values, picture: bool, page:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.cli.tables import summary_table, timing_table
+    from pneumo_ros.log.reading import read_log
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
+    from pneumo_ros.session.warnings import warnings_of
 
     session = load_session(target)
     other = passive_run(session)
-    ours = summarise(session, loop_timing(target), wall_time(target))
+    loop = loop_timing(target)
+    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))
     console.print(timing_table(ours))
+    for line in ours.warnings:
+        console.print(f"[yellow]warning[/]  {line}", highlight=False, soft_wrap=True)
     console.print(f"log      {target}")
     if picture:
         from pneumo_ros.session.picture import draw_session
@@ -351,7 +373,6 @@ def _report(console: Console, target: Path, values: Values, picture: bool, page:
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}")
     if page:
-        from pneumo_ros.log.reading import read_log
         from pneumo_ros.session.report import write_report
 
         html = target.with_suffix(".html")

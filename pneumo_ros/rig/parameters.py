@@ -61,6 +61,7 @@ LIMITS: dict[str, Limit] = {
     "effective_area_scale": Limit("1", 0.2, 5.0, "factor on the effective area surface"),
     "volume_scale": Limit("1", 0.2, 5.0, "factor on the air spring volume"),
     "discharge_coefficient": Limit("1", 0.05, 2.0, "factor on every orifice area"),
+    "length_scale": Limit("1", 0.01, 100.0, "full-scale vehicle over the rig, in length; time scale 1"),
     "displacement_noise": Limit("m", 0.0, 0.01, "standard deviation of white LVDT noise"),
     "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
     "model_form": Limit(
@@ -140,6 +141,7 @@ class Rig:
     effective_area_scale: Quantity
     volume_scale: Quantity
     discharge_coefficient: Quantity
+    length_scale: Quantity
     displacement_noise: Quantity
     pressure_noise: Quantity
     model_form: Quantity = Quantity(0.0, 0.0, "1")
