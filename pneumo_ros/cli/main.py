@@ -32,6 +32,7 @@ BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
+    "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
     "log": "Look into a session log: info, validate, recover, export, compare, report.",
@@ -49,19 +50,34 @@ class LazyGroup(TyperGroup):
         """Verbs in the order of :data:`VERBS`."""
         return list(VERBS)
 
+    _listing = False
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The list of verbs needs their names and summaries only: nothing is imported."""
+        self._listing = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._listing = False
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Name and summary of a verb, for the list of them: nothing is imported."""
-        return TyperCommand(cmd_name, help=VERBS[cmd_name]) if cmd_name in VERBS else None
+        """Import a verb; the modules import what is heavy inside their functions."""
+        if cmd_name not in VERBS:
+            return None
+        if self._listing:
+            return TyperCommand(cmd_name, help=VERBS[cmd_name])
+        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{cmd_name}").app)
+        command.name = cmd_name
+        return command
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Import the verb that runs; the modules import what is heavy inside their functions."""
+        """The verb that runs."""
         name = args[0]
         if name.startswith("-"):
             return super().resolve_command(ctx, args)
         if name not in VERBS:
             raise not_one_of("no such verb", name, VERBS, where="pneumo")
-        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{name}").app)
-        command.name = name
+        command = self.get_command(ctx, name)
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on a verb may have something to end
         return name, command, args[1:]
 

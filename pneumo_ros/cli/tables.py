@@ -62,6 +62,16 @@ def _milliseconds(values: dict[str, str], key: str) -> str:
     return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
 
 
+def plain_table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Table:
+    """Texts in columns, all to the left; the last one may break over lines, the first never does."""
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 2, 0, 0), pad_edge=False)
+    for number, column in enumerate(columns):
+        table.add_column(column, no_wrap=number == 0)
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
 def simple_table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Table:
     """Texts in columns, the first to the left and the others to the right."""
     table = Table(box=box.SIMPLE)

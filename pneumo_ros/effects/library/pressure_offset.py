@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -29,4 +30,12 @@ EFFECT = Effect(
     parameters=(EffectParameter("offset", "Pa", -6e4, 6e4, 2e3, size=True),),
     outputs=outputs,
     undo=undo,
+    guide=Guide(
+        meaning="A pressure sensor's zero is off.",
+        check="vent the spring: the sensor says {offset} more (less) than the barometer",
+        mistaken_for={
+            "pressure_scale": "vented, the sensor is right",
+            "payload": "the scales under the axles agree with the rig file",
+        },
+    ),
 )
