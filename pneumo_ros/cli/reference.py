@@ -25,8 +25,8 @@ real rig say under the same names.
 """
 EFFECTS_HEAD = """# Effects
 
-Made from the files of `pneumo_ros/effects/library` by `make docs`: what a diagnosis can name, and how an engineer at the
-rig checks it by hand. `pneumo effects ID` shows the same on the terminal.
+Made from the files of `pneumo_ros/effects/library` by `make docs`: what a diagnosis can name, and how an engineer at
+the rig checks it by hand. `pneumo effects ID` shows the same on the terminal.
 
 """
 PARAMETERS_HEAD = """# Parameters

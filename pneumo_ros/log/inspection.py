@@ -175,8 +175,8 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
         stamps, logged = columns.stamp_ns, columns.log_time_ns
     else:
         stamps = logged = log.records(name).log_time_ns
-    # Events and health come from several nodes at once: their stamps say nothing about a rate.
-    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY
+    # Events and health come from several nodes at once, openings when they change: their stamps say nothing of a rate.
+    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY and name != topics.APPLIED.name
     timing = measure_timing(stamps, logged, log.records(name).disordered) if periodic else None
     first, last = (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
     return TopicReport(name, info.type, info.count, first, last, info.qos, timing)
