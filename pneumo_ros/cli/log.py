@@ -88,14 +88,23 @@ def recover(
 def export(
     log: LogPath,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for one file a topic; made if missing.")],
-    kind: Annotated[str, typer.Option("--format", "-f", help="csv or parquet.")] = "csv",
+    kind: Annotated[str, typer.Option("--format", "-f", help="csv, parquet or mat.")] = "csv",
     topic: Annotated[list[str] | None, typer.Option("--topic", "-t", help="Only this topic; may be repeated.")] = None,
     overwrite: Overwrite = False,
+    merged: Annotated[
+        bool, typer.Option("--merged", help="One table of all topics with numbers, at the sensors' instants.")
+    ] = False,
 ) -> None:
-    """Write topics as tables for pandas: log_time_ns, stamp_ns and one column a channel, SI units."""
+    """Write topics as tables for pandas or MATLAB: log_time_ns, stamp_ns and one column a channel, SI units."""
     from pneumo_ros.log.reading import read_log
     from pneumo_ros.log.tables import export as export_tables
+    from pneumo_ros.log.tables import export_merged
 
+    if merged:
+        console.print(
+            str(export_merged(read_log(log), output, kind, topic, overwrite)), highlight=False, soft_wrap=True
+        )
+        return
     for path in export_tables(read_log(log), output, kind, topic, overwrite):
         console.print(str(path), highlight=False, soft_wrap=True)
 

@@ -61,13 +61,16 @@ LIMITS: dict[str, Limit] = {
     "effective_area_scale": Limit("1", 0.2, 5.0, "factor on the effective area surface"),
     "volume_scale": Limit("1", 0.2, 5.0, "factor on the air spring volume"),
     "discharge_coefficient": Limit("1", 0.05, 2.0, "factor on every orifice area"),
-    "length_scale": Limit("1", 0.01, 100.0, "full-scale vehicle over the rig, in length; time scale 1"),
     "displacement_noise": Limit("m", 0.0, 0.01, "standard deviation of white LVDT noise"),
     "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
+    "length_scale": Limit("1", 0.01, 100.0, "full-scale vehicle over the rig, in length; time scale 1"),
     "model_form": Limit(
         "1", 0.0, 0.5, "share of each channel's std below which a difference is no effect to its maker"
     ),
 }
+
+OPTIONAL = {"length_scale": 5.0, "model_form": 0.0}
+"""Numbers that a text may leave out, and what that means: the first is the thesis's Honda Civic over its rig."""
 
 # What an end may have of its own where the rig has one number for both, or where the command is not what happens.
 END_LIMITS: dict[str, Limit] = {
@@ -141,9 +144,9 @@ class Rig:
     effective_area_scale: Quantity
     volume_scale: Quantity
     discharge_coefficient: Quantity
-    length_scale: Quantity
     displacement_noise: Quantity
     pressure_noise: Quantity
+    length_scale: Quantity = Quantity(5.0, 0.0, "1")
     model_form: Quantity = Quantity(0.0, 0.0, "1")
     ends: tuple[tuple[str, float], ...] = ()
     effects: tuple[NamedEffect, ...] = ()
@@ -187,8 +190,8 @@ class Rig:
         out: dict[str, Any] = {"name": self.name}
         for name in LIMITS:
             q: Quantity = getattr(self, name)
-            if name == "model_form" and q.value == 0.0:
-                continue  # absent means zero, as in the logs of others
+            if OPTIONAL.get(name) == q.value:
+                continue  # absent means this, as in the logs of others
             out[name] = {"value": q.value, "std": q.std, "unit": q.unit}
         return out
 
@@ -289,11 +292,11 @@ def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
     for key in entries:
         if key not in known:
             _limit_of(str(key), where)
-    base = {"model_form": {"value": 0.0, "unit": "1"}}
+    base: dict[str, Any] = {name: {"value": value, "unit": "1"} for name, value in OPTIONAL.items()}
     base |= {} if known - set(base) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
-    left_out = tuple(key for key in LIMITS if key not in entries)
+    left_out = tuple(key for key in LIMITS if key not in entries and key not in OPTIONAL)
     return Rig(name=name, assumed=left_out, **quantities)  # type: ignore[arg-type]  # ends, effects: their defaults
 
 
