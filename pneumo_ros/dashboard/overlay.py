@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.dashboard.panels import thin
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.comparison import align
+from pneumo_ros.log.comparison import align, start_of
 from pneumo_ros.log.reading import Log
 from pneumo_ros.log.topics import DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE
 
@@ -84,7 +84,7 @@ def _series(log: Log, prefix: str, name: str, colour: str, offset: float) -> Ser
     joint = log.select(topics[0], list(DISPLACEMENT.names))
     pressures = [log.pressure(topic) for topic in topics[1:]]
     columns = [np.interp(joint.stamp_ns, one.stamp_ns, one.value) * 1e-3 for one in pressures]
-    time = (joint.stamp_ns - joint.stamp_ns[0]) * 1e-9 - offset
+    time = np.asarray((joint.stamp_ns - start_of(log)) * 1e-9 - offset, dtype=np.float64)
     return Series(name, colour, time, np.column_stack([joint.position * 1e3, *columns]))
 
 

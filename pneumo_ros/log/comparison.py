@@ -124,7 +124,7 @@ def _road(log: Log) -> NDArray[np.float64]:
     if ROAD.name not in log.topics or log.topics[ROAD.name].count < MIN_ROAD:
         return np.empty(0)
     joint = log.select(ROAD.name, ["front"])
-    time = (joint.stamp_ns - _start(log)) * 1e-9
+    time = (joint.stamp_ns - start_of(log)) * 1e-9
     grid = np.arange(0.0, time[-1], ROAD_STEP)
     return np.asarray(np.interp(grid, time, np.nan_to_num(joint.position[:, 0])))
 
@@ -165,7 +165,7 @@ def _signals(first: Log, second: Log, topic: str, offset: int) -> Iterator[Signa
     if infos[0].type != infos[1].type or any(i.encoding != "cdr" or i.count < 2 for i in infos):
         return
     a, b = table(first, topic), table(second, topic)
-    times = (a["stamp_ns"] - _start(first), b["stamp_ns"] - _start(second) - offset)
+    times = (a["stamp_ns"] - start_of(first), b["stamp_ns"] - start_of(second) - offset)
     known = BY_NAME.get(topic)
     for column in a:
         if column not in _KEYS and column in b and _numeric(a, column) and _numeric(b, column):
@@ -211,8 +211,8 @@ def _numeric(content: Table, column: str) -> bool:
     return content[column].dtype.kind in "biuf"
 
 
-def _start(log: Log) -> int:
-    """The first stamp of the periodic topics, ns: both logs start at 0 s."""
+def start_of(log: Log) -> int:
+    """The first stamp of the periodic topics, ns: every log's time is told from there."""
     stamps = [
         int(log.columns(name).stamp_ns.min())
         for name, info in log.topics.items()
