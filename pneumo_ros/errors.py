@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class PneumoError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
@@ -45,6 +47,24 @@ class InputError(PneumoError):
         if self.remedy is not None:
             parts.append(f"; {self.remedy}")
         return " ".join("".join(parts).split())
+
+
+def not_one_of(
+    what: str, value: str, choices: Iterable[str], *, where: object = None, key: str | None = None, also: str = ""
+) -> InputError:
+    """A name that is none of ``choices``: the whole list, ``also`` what else would do, and the nearest as a remedy."""
+    names = list(choices)
+    allowed = ", ".join([*names, also] if also else names)
+    return InputError(what, where=where, key=key, value=value, allowed=allowed, remedy=did_you_mean(value, names))
+
+
+def did_you_mean(value: str, choices: Iterable[str]) -> str | None:
+    """``did you mean 'x'?`` for the choice that is spelt most like ``value``; None if none is like it."""
+    from difflib import get_close_matches
+
+    plain = {name.lower(): name for name in choices}
+    near = get_close_matches(value.lower(), plain, n=1) or [name for name in plain if value and name.startswith(value)]
+    return f"did you mean '{plain[near[0]]}'?" if near else None
 
 
 def _short(value: object, limit: int = 80) -> str:

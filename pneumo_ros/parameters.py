@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from pneumo_ros.errors import InputError
+from pneumo_ros.errors import InputError, did_you_mean
 
 Value = float | int | str | bool
 
@@ -56,9 +56,13 @@ class Parameter:
                 key=self.name,
                 value=raw,
                 allowed=self.allowed,
-                remedy=f"default is {self.default!r}",
+                remedy=self._remedy(raw),
             )
         return value
+
+    def _remedy(self, raw: object) -> str:
+        near = did_you_mean(raw, self.choices) if isinstance(raw, str) else None
+        return near or f"default is {self.default!r}"
 
     def _accepts(self, value: Value) -> bool:
         if self.choices:

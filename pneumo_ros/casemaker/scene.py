@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pneumo_ros.casemaker.controller import ACTIVE, LEVELLING
 from pneumo_ros.casemaker.excitation import road, valve_steps, valve_waves
@@ -150,6 +149,8 @@ def _sampled(
     stamps = time[:, None] + shift
     sensors = done.measured
     if scene.jitter > 0.0 and np.isfinite(sensors).all():  # a rig that ran away is told by what it leaves
+        from scipy.interpolate import CubicSpline  # here: slow to import
+
         clean = CubicSpline(time, done.measured - noise)
         moved = np.hstack([clean(np.minimum(stamps[:, 0], time[-1]))[:, :4],
                            clean(np.minimum(stamps[:, 1], time[-1]))[:, 4:]])  # fmt: skip

@@ -63,13 +63,13 @@ def diagnose(
     only: Only = "",
 ) -> None:
     """Run the diagnosis on every case of a set; it sees the logs and which effects to do without, nothing else."""
-    from pneumo_ros.cli.blind_work import diagnose_case
-
     results = output or folder / "diagnoses"
     entries = [entry for entry in read_manifest(folder)["cases"] if only in entry["name"]]
     if not entries:
         raise InputError("no case has this in its name", where=folder, key="--only", value=only,
                          remedy="leave it away to diagnose all")  # fmt: skip
+    from pneumo_ros.cli.blind_work import diagnose_case
+
     items = [(entry["name"], tuple(entry["withhold"]), str(folder), str(results)) for entry in entries]
     _run("diagnosing", diagnose_case, items, [entry["name"] for entry in entries], workers, scheduler)
 
@@ -85,11 +85,11 @@ def score(
     ] = None,
 ) -> None:
     """Open the answers, check their seals, score the diagnosis and four baselines."""
+    manifest = read_manifest(folder)
     from pneumo_ros.casemaker.scoring.report import write_report
     from pneumo_ros.casemaker.scoring.results import load_results
     from pneumo_ros.casemaker.seal import opened
 
-    manifest = read_manifest(folder)
     digests = {entry["name"]: entry["label_sha256"] for entry in manifest["cases"]}
     wanted = None if expect is None else _expected(expect)
     answers = opened(labels or folder / "labels.json", digests)

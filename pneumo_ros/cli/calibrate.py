@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pneumo_ros.cli.existing import Overwrite, refuse_existing
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -28,6 +30,7 @@ def calibrate(
         str, typer.Option(help="Calibration to check, or to take the other channels from: name or YAML file.")
     ] = "appendix_c",
     output: Annotated[Path, typer.Option(help="Calibration file to write.")] = Path("calibration.yaml"),
+    overwrite: Overwrite = False,
     plot: Annotated[Path | None, typer.Option(help="Picture of points, lines and residuals (PNG, PDF, SVG).")] = None,
     adc_bits: Annotated[int, typer.Option(min=8, max=32, help="Width of the board's converter, bit.")] = 16,
     adc_range: Annotated[float, typer.Option(min=0.1, max=100.0, help="Range of the board's inputs, +- V.")] = 10.0,
@@ -38,12 +41,12 @@ def calibrate(
     if points is None and not check:
         raise InputError("nothing to do", where="pneumo calibrate", remedy="give a CSV file of points, or --check")
     if points is not None:
-        calibration = str(_fit(points, calibration, output, plot))
+        calibration = str(_fit(points, calibration, output, plot, overwrite))
     if check:
         _check(calibration, adc_bits, adc_range)
 
 
-def _fit(points: Path, base: str, output: Path, plot: Path | None) -> Path:
+def _fit(points: Path, base: str, output: Path, plot: Path | None, overwrite: bool) -> Path:
     from dataclasses import replace
 
     from pneumo_ros.daq.calibration_file import load_calibration, save_calibration
@@ -52,6 +55,7 @@ def _fit(points: Path, base: str, output: Path, plot: Path | None) -> Path:
 
     if output.suffix not in (".yaml", ".yml"):
         raise InputError("not a YAML name", where="--output", value=str(output), allowed="a name that ends in .yaml")
+    refuse_existing([output, *([plot] if plot is not None else [])], overwrite)
     fits = [fit_points(channel, points) for channel in read_points(points)]
     old, today = load_calibration(base), date.today().isoformat()
     lines = {fit.points.channel: fit.calibration(today, f"pneumo calibrate {points.name}") for fit in fits}

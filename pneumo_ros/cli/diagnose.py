@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
+from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,6 +62,7 @@ def diagnose(
         ),
     ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
+    overwrite: Overwrite = False,
     tables: Annotated[
         bool, typer.Option("--tables", help="Instead of logs: what the Chapter 5 model misses in Tables 5.4 and 5.5.")
     ] = False,
@@ -80,6 +83,8 @@ def diagnose(
     if not fit or output is None:
         missing = "no log to fit" if not fit else "no folder for the diagnosis"
         raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
+    _check_files(fit, holdout, edit, rig, effect)
+    refuse_old_diagnosis(output, save_rig, overwrite, [rig] if rig is not None else [])
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.diagnosis.half_car.experiment import design_experiment
     from pneumo_ros.diagnosis.half_car.from_logs import prepared
@@ -92,7 +97,10 @@ def diagnose(
         claim_folder(save_rig.parent)
         if save_rig.is_dir():
             raise InputError("is a folder", where=save_rig, key="--save-rig", remedy="name a file, RIG.yaml")
-    task = prepared(fit, holdout, None if rig is None else load_rig(rig), edit, effect or (), without or ())
+    own = None if rig is None else load_rig(rig)
+    if own is not None:
+        tell_assumed(console, own, rig)
+    task = prepared(fit, holdout, own, edit, effect or (), without or ())
     options = Options(pairs=pairs, experiment=design_experiment)
     with _bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
@@ -107,6 +115,20 @@ def diagnose(
         console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
         console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+
+
+def _check_files(
+    fit: Sequence[Path], holdout: Path | None, edit: Path | None, rig: Path | None, effects: Sequence[Path] | None
+) -> None:
+    """What is read is there, before seconds of imports."""
+    from pneumo_ros.log.bags import check_log
+
+    for log in (*fit, holdout, edit):
+        if log is not None:
+            check_log(log)
+    for key, file in (("--rig", rig), *(("--effect", path) for path in effects or ())):
+        if file is not None and not file.is_file():
+            raise InputError("no such file", where=file, key=key, remedy="check the name")
 
 
 def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: Sequence[Signals]) -> None:

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from pneumo_ros.parameters import Value
+    from pneumo_ros.rig import Rig
     from pneumo_ros.road import Road
 
 app = typer.Typer(add_completion=False)
@@ -39,31 +40,36 @@ def emulate(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing.")] = False,
 ) -> None:  # fmt: skip
     """Emulate the rig on a pseudo-terminal: plant in real time, converters, valves, watchdog, and faults."""
-    import signal
-    import time
-
     from rich.console import Console
 
-    from pneumo_ros.daq.calibration_file import load_calibration
-    from pneumo_ros.daq.emulator.board import board_identity
-    from pneumo_ros.daq.emulator.emulator import Emulator
+    from pneumo_ros.cli.choices import check_road
     from pneumo_ros.daq.emulator.faults import parse_fault
-    from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
-    from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
-    from pneumo_ros.effects.stepping import stepped_rig
-    from pneumo_ros.rig import load_rig
 
     console = Console(quiet=quiet, highlight=False)
     if list_faults:
         _show_faults(console)
         return
+    faults = [parse_fault(text) for text in fault or []]
+    check_road(road)
+    import signal
+    import time
+
+    from pneumo_ros.cli.rig_notes import tell_assumed
+    from pneumo_ros.daq.calibration_file import load_calibration
+    from pneumo_ros.daq.emulator.board import board_identity
+    from pneumo_ros.daq.emulator.emulator import Emulator
+    from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
+    from pneumo_ros.daq.priority import freeze_startup_objects, prefer_this_process
+    from pneumo_ros.effects.stepping import stepped_rig
+    from pneumo_ros.rig import load_rig
+
     the_rig = load_rig(rig)
+    tell_assumed(console, the_rig, rig)
     hello = board_identity(boot_id=round(time.time()) % 2**32, adc_bits=adc_bits, dac_bits=dac_bits)
     simulation = RigSimulation(
-        the_rig, _road(road, speed, seed, the_rig.wheelbase), hello, load_calibration(calibration),
+        the_rig, _road(road, speed, seed, the_rig), hello, load_calibration(calibration),
         SimulationSettings(seed, converter_noise), stepped_rig(the_rig, hello.sample_period_us * 1e-6),
     )  # fmt: skip
-    faults = [parse_fault(text) for text in fault or []]
     say = lambda state: console.print(f"board: {state.name.lower()}")  # noqa: E731
     emulator = Emulator(simulation, link, faults, seed, start_us, say)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -80,7 +86,7 @@ def emulate(
         done.save(record)
 
 
-def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
+def _road(road: str, speed: float, seed: int, rig: Rig) -> Road:
     from pneumo_ros.road import build_road
 
     values: dict[str, Value]
@@ -90,7 +96,8 @@ def _road(road: str, speed: float, seed: int, wheelbase: float) -> Road:
         values = {"kind": "file", "path": road}
     else:
         values = {"kind": road}
-    return build_road({**values, "speed_kmh": speed, "seed": seed}, wheelbase=wheelbase, where="--road")
+    given = {**values, "speed_kmh": speed, "seed": seed}
+    return build_road(given, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="--road")
 
 
 def _show_faults(console: Console) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,11 +12,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 if TYPE_CHECKING:
     from pneumo_ros.log.comparison import Comparison
-    from pneumo_ros.log.inspection import Report, TopicReport
+    from pneumo_ros.log.inspection import Report, Timing, TopicReport
     from pneumo_ros.log.repair import Recovery
     from pneumo_ros.log.salvage import Salvaged
 
@@ -33,6 +35,10 @@ _WIDE = 130  # columns from which the types are shown as well
 _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
 _COLOUR = {"ok": "green", "note": "cyan", "warning": "yellow", "error": "red"}
 FINDINGS_EXIT = 1
+_NO_SIGNALS = ("/diagnostics", "/rig/events")
+_SHOWN_AS = {  # SI unit -> factor and the unit whose numbers are short
+    "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m2": (1e6, "mm2"), "Pa": (1e-3, "kPa"), "rad": (1e3, "mrad"),
+}  # fmt: skip
 
 
 @app.command()
@@ -82,14 +88,23 @@ def recover(
 def export(
     log: LogPath,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for one file a topic; made if missing.")],
-    kind: Annotated[str, typer.Option("--format", "-f", help="csv or parquet.")] = "csv",
+    kind: Annotated[str, typer.Option("--format", "-f", help="csv, parquet or mat.")] = "csv",
     topic: Annotated[list[str] | None, typer.Option("--topic", "-t", help="Only this topic; may be repeated.")] = None,
     overwrite: Overwrite = False,
+    merged: Annotated[
+        bool, typer.Option("--merged", help="One table of all topics with numbers, at the sensors' instants.")
+    ] = False,
 ) -> None:
-    """Write topics as tables for pandas: log_time_ns, stamp_ns and one column a channel, SI units."""
+    """Write topics as tables for pandas or MATLAB: log_time_ns, stamp_ns and one column a channel, SI units."""
     from pneumo_ros.log.reading import read_log
     from pneumo_ros.log.tables import export as export_tables
+    from pneumo_ros.log.tables import export_merged
 
+    if merged:
+        console.print(
+            str(export_merged(read_log(log), output, kind, topic, overwrite)), highlight=False, soft_wrap=True
+        )
+        return
     for path in export_tables(read_log(log), output, kind, topic, overwrite):
         console.print(str(path), highlight=False, soft_wrap=True)
 
@@ -131,23 +146,44 @@ def report(
 
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
-    console.print(_topics_table(report.topics))
+    start = start_of(report)
+    _show_events(report, start)
+    console.print(_topics_table([topic for topic in report.topics if topic.count]))
+    empty = ", ".join(topic.name for topic in report.topics if not topic.count)
+    if empty:
+        console.print(f"no messages on: {empty}", highlight=False)
+    for topic in report.topics:
+        if topic.timing is not None and topic.timing.gaps:
+            console.print(f"[yellow]{topic.name}[/]: {_gaps_in_words(topic.timing)}", highlight=False)
     if report.missing_topics:
         console.print(f"[red]missing topics[/] {', '.join(report.missing_topics)}")
     if report.unprotected:
         console.print("[yellow]some content carries no checksum[/]: damage in it cannot be seen")
-    _show_settings(report)
-    _show_events(report)
+    _show_settings(report, start)
+
+
+def start_of(report: Report) -> int:
+    """The first stamp of a periodic topic, ns: times are told from there."""
+    return min((topic.first_ns for topic in report.topics if topic.timing is not None), default=0)
+
+
+def _seconds(time_ns: int, start: int) -> str:
+    return f"{(time_ns - start) * 1e-9:.3f}"
+
+
+def _gaps_in_words(timing: Timing) -> str:
+    return f"{timing.missing} samples missing in {len(timing.gaps)} gaps, the longest {timing.gaps[0].length:.4g} s"
 
 
 def _topics_table(found: Sequence[TopicReport]) -> Table:
     wide = console.width >= _WIDE
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    title = "Topics; jitter and delay (p50, p99) in ms"
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     table.add_column("topic", no_wrap=True)
     if wide:
         table.add_column("type", no_wrap=True)
-    for title in ("messages", "s", "Hz", "jitter ms", "missing", "delay ms", "clock"):
-        table.add_column(title, justify="right", no_wrap=title not in ("missing", "clock"))
+    for name in ("count", "s", "Hz", "jitter", "missing", "delay", "clock"):
+        table.add_column(name, justify="right", no_wrap=True)
     for topic in found:
         table.add_row(topic.name, *([topic.type] if wide else []), *_topic_figures(topic))
     return table
@@ -158,35 +194,37 @@ def _topic_figures(topic: TopicReport) -> list[str]:
     if t is None:
         return [str(topic.count), *[""] * 6]
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
-    missing = f"{t.missing} in {len(t.gaps)} gaps, max {t.gaps[0].length:.4g} s" if t.gaps else "0"
-    delay = f"{t.delay_p50 * 1e3:.3g}, {t.delay_p99 * 1e3:.3g}"
-    numbers = [f"{topic.duration:.3f}", f"{t.rate_hz:.6g}", f"{t.jitter * 1e3:.3g}", missing, delay]
+    delay = f"{t.delay_p50 * 1e3:.2g}, {t.delay_p99 * 1e3:.2g}"
+    numbers = [f"{topic.duration:.2f}", f"{t.rate_hz:.4g}", f"{t.jitter * 1e3:.2g}", str(t.missing), delay]
     return [str(topic.count), *numbers, ", ".join(clock) or "ok"]
 
 
-def _show_settings(report: Report) -> None:
-    table = Table("from", "key", "value", title="What explains the run", title_justify="left", box=SIMPLE_HEAD)
-    table.add_row("rig", "name", report.rig or "not in the log")
+def _show_settings(report: Report, start: int) -> None:
+    console.print("\n[bold]What explains the run[/]")
+    _say("rig", report.rig or "not in the log")
     for key, (nominal, ours) in report.changed_parameters.items():
-        table.add_row("rig", key, f"{ours:g} (nominal {nominal:g})")
+        _say(f"rig, {key}", f"{ours:g} (nominal {nominal:g})")
     for text in report.found_in_rig:
-        table.add_row("rig, as diagnosed", "", text)
+        _say("rig, as diagnosed", text)
     for name, entries in report.metadata:
-        for key, value in entries.items():
-            table.add_row(name, key, _short(value) if "\n" not in value else f"({len(value)} characters)")
+        shown = [f"{key} {_short(value)}" for key, value in entries.items() if "\n" not in value]
+        shown += [f"{key} ({len(value)} characters)" for key, value in entries.items() if "\n" in value]
+        _say(name, ", ".join(shown))
     before: dict[str, dict[str, object]] = {}
     for setup in report.setups:
         known = before.setdefault(setup.node, {})
         new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
-        word = "changed" if known.keys() & new.keys() else "parameters"
+        word = f"changed at {_seconds(setup.time_ns, start)} s" if known.keys() & new.keys() else "at the start"
         known.update(new)
-        shown = ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != "")
-        table.add_row(f"{setup.node}, {setup.time_ns / 1e9:.3f} s", word, shown)
+        _say(f"{setup.node} {word}", ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != ""))
     for time_ns, calibration in report.calibrations:
-        table.add_row(f"calibration, {time_ns / 1e9:.3f} s", "", _short(" ".join(calibration.split())))
+        _say(f"calibration from {_seconds(time_ns, start)} s on", _short(" ".join(calibration.split())))
     for name, size in report.attachments:
-        table.add_row("attachment", name, f"{size} bytes")
-    console.print(table)
+        _say("attachment", f"{name}, {size} bytes")
+
+
+def _say(what: str, text: str) -> None:
+    console.print(f"[cyan]{escape(what)}[/]: {escape(text)}", highlight=False)
 
 
 def _short(value: object, limit: int = 120) -> str:
@@ -194,15 +232,18 @@ def _short(value: object, limit: int = 120) -> str:
     return text if len(text) <= limit else f"{text[:limit]}... ({len(text)} characters)"
 
 
-def _show_events(report: Report) -> None:
+def _show_events(report: Report, start: int) -> None:
     if not report.events:
+        console.print("no events")
         return
-    table = Table("time s", "level", "node", "code", "what", title="Events", title_justify="left", box=SIMPLE_HEAD)
+    table = Table(title="Events", title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    for name in ("s", "level", "node", "what"):
+        table.add_column(name, justify="right" if name == "s" else "left", no_wrap=name != "what")
     for event in report.events[:_EVENTS_SHOWN]:
-        values = ", ".join(f"{k} {v}" for k, v in event.values.items())
-        text = f"{event.message} ({values})" if values else event.message
+        values = ", ".join(f"{k} {v}" for k, v in event.values.items() if k != "start_ns")
+        text = f"{event.code}: {event.message}" + (f" ({values})" if values else "")
         level = _LEVELS.get(event.level, str(event.level))
-        table.add_row(f"{event.time_ns / 1e9:.3f}", level, event.source, event.code, text)
+        table.add_row(_seconds(event.time_ns, start), level, event.source, escape(text))
     console.print(table)
     if len(report.events) > _EVENTS_SHOWN:
         console.print(f"... and {len(report.events) - _EVENTS_SHOWN} more (--json shows all)")
@@ -230,28 +271,50 @@ def _show_comparison(result: Comparison) -> None:
     for title, names in (("only in the first", result.only_first), ("only in the second", result.only_second)):
         if names:
             console.print(f"{title}: {', '.join(names)}", highlight=False)
-    settings = Table(
-        "where", "key", "first", "second", title="Settings that differ", title_justify="left", box=SIMPLE_HEAD
-    )
+    _show_kinship(result)
+    settings = Table("where", "key", "first", "second", title="Settings that differ", title_justify="left",
+                     box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)  # fmt: skip
     for d in result.settings:
-        settings.add_row(d.where, d.key, str(d.first)[:80], str(d.second)[:80])
+        settings.add_row(d.where, d.key, escape(_short(d.first, 60)), escape(_short(d.second, 60)))
     console.print(settings if result.settings else "same settings")
     counts = Table("topic", "first", "second", "payload", title="Messages", title_justify="left", box=SIMPLE_HEAD)
     for name, (a, b) in result.counts.items():
         counts.add_row(name, str(a), str(b), "equal byte by byte" if name in result.identical else "differs")
     console.print(counts)
-    signals = Table(title="Signals: std of each, difference at equal times", title_justify="left", box=SIMPLE_HEAD)
+    console.print(_signals_table(result))
+
+
+def _show_kinship(result: Comparison) -> None:
+    """Whether road and rig are the same, and how the logs were laid over each other."""
+    rig = [d.key for d in result.settings if d.where == "rig"]
+    if rig:
+        console.print(f"[yellow]two rigs[/]: {', '.join(rig)} differ", highlight=False)
+    if result.roads == "two":
+        console.print("[yellow]two roads[/]: differences are of the roads as well; laid over each other at their start")
+    elif result.roads == "same":
+        moved = f"; the second log is moved by {-result.offset:+.3f} s to meet it" if result.offset else ""
+        console.print(f"same road{moved}", highlight=False)
+
+
+def _signals_table(result: Comparison) -> Table:
+    signals = Table(title="Signals: std of each, difference at equal times", title_justify="left", box=SIMPLE_HEAD,
+                    padding=(0, 1, 0, 0), pad_edge=False)  # fmt: skip
     signals.add_column("topic, column", no_wrap=True)
-    for title in ("first", "second", "samples", "rms", "largest"):
+    for title in ("unit", "first", "second", "count", "rms", "largest"):
         signals.add_column(title, justify="right", no_wrap=True)
     before = ""
-    for s in result.signals:
+    for s in (s for s in result.signals if s.topic not in _NO_SIGNALS):
         if s.topic != before:
             signals.add_row(s.topic)
             before = s.topic
-        numbers = [f"{s.std[0]:.4g}", f"{s.std[1]:.4g}", str(s.common), f"{s.rms:.3g}", f"{s.largest:.3g}"]
-        signals.add_row(f"  {s.column}", *numbers)
-    console.print(signals)
+        factor, unit = _SHOWN_AS.get(s.unit, (1.0, s.unit))
+        std, gap = [_number(factor * one) for one in s.std], [_number(factor * one) for one in (s.rms, s.largest)]
+        signals.add_row(f"  {s.column}", unit, *std, str(s.common), *gap)
+    return signals
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}".replace("e+0", "e").replace("e-0", "e-") if math.isfinite(value) else "-"
 
 
 if __name__ == "__main__":

@@ -1,23 +1,38 @@
+# ruff: noqa: E402
 """`pneumo`: verbs are imported only when asked for, so that `pneumo --help` is quick."""
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+from types import FrameType
+
+INTERRUPTED = 130  # exit code, as a shell says of Ctrl-C
+
+
+def _stopped(number: int = signal.SIGINT, frame: FrameType | None = None) -> None:
+    os.write(2, b"stopped by the user\n")
+    os._exit(INTERRUPTED)
+
+
+if __name__ == "__main__" or sys.argv[0].endswith("pneumo"):
+    signal.signal(signal.SIGINT, _stopped)  # first of all: nothing has begun that would have to end in order
+
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from pneumo_ros import __version__
-from pneumo_ros.errors import PneumoError
+from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
+    "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
     "log": "Look into a session log: info, validate, recover, export, compare, report.",
@@ -35,13 +50,44 @@ class LazyGroup(TyperGroup):
         """Verbs in the order of :data:`VERBS`."""
         return list(VERBS)
 
+    _listing = False
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The list of verbs needs their names and summaries only: nothing is imported."""
+        self._listing = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._listing = False
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Import a verb; the modules import what is heavy inside their functions."""
         if cmd_name not in VERBS:
             return None
+        if self._listing:
+            return TyperCommand(cmd_name, help=VERBS[cmd_name])
         command = typer.main.get_command(import_module(f"pneumo_ros.cli.{cmd_name}").app)
         command.name = cmd_name
         return command
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The verb that runs."""
+        name = args[0]
+        if name.startswith("-"):
+            return super().resolve_command(ctx, args)
+        if name not in VERBS:
+            raise not_one_of("no such verb", name, VERBS, where="pneumo")
+        command = self.get_command(ctx, name)
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on a verb may have something to end
+        return name, command, args[1:]
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb; Ctrl-C that it leaves to us is one line."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            print("stopped by the user", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
 
 
 app = typer.Typer(
@@ -71,6 +117,9 @@ def main() -> None:
     try:
         app()
     except PneumoError as error:
+        from rich.console import Console
+        from rich.markup import escape
+
         Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]error:[/red] {escape(str(error))}")
         sys.exit(BAD_INPUT)
 

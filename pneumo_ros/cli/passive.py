@@ -8,8 +8,8 @@ from pneumo_ros.session.summary import Recorded
 
 
 def passive_run(session: Recorded) -> Recorded | None:
-    """None where the log lacks truth or road."""
-    if len(session.truth) < 2 or len(session.road) < 2:
+    """None where the log lacks motion or road."""
+    if max(len(session.truth), len(session.measured)) < 2 or len(session.road) < 2:
         return None
     rig = session.rig
     return passive_session(session, stepped_rig(rig, road_period(session)) if rig.diagnosed else None)

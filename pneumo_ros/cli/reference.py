@@ -9,6 +9,8 @@ from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
+from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.sheet import effects_page
 from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
 
@@ -19,6 +21,12 @@ the instant its values hold. `JointState` is used as the stamped, named standard
 in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position. On
 hardware (`pneumo run --source serial`) the node `daq` takes the place of `plant`: it publishes what the sensors of the
 real rig say under the same names.
+
+"""
+EFFECTS_HEAD = """# Effects
+
+Made from the files of `pneumo_ros/effects/library` by `make docs`: what a diagnosis can name, and how an engineer at
+the rig checks it by hand. `pneumo effects ID` shows the same on the terminal.
 
 """
 PARAMETERS_HEAD = """# Parameters
@@ -43,7 +51,12 @@ def parameters_table(table: tuple[Parameter, ...]) -> str:
 def documents() -> dict[str, str]:
     """File name below docs/ -> text."""
     parts = [f"## {node}\n\n{parameters_table(table)}" for node, table in node_tables().items()]
-    return {"topics.md": TOPICS_HEAD + topics_table(), "parameters.md": PARAMETERS_HEAD + "\n".join(parts)}
+    page = EFFECTS_HEAD + effects_page(load_library())
+    return {
+        "effects.md": page,
+        "topics.md": TOPICS_HEAD + topics_table(),
+        "parameters.md": PARAMETERS_HEAD + "\n".join(parts),
+    }
 
 
 def main() -> None:

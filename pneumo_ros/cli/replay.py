@@ -14,6 +14,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ def replay(
     closed_loop: Annotated[
         bool, typer.Option("--closed-loop", help="The recorded road through the rig's model, which then reacts.")
     ] = False,
+    open_loop: Annotated[
+        bool, typer.Option("--open-loop", help="The recorded road and valve openings through any rig (--rig).")
+    ] = False,
     diagnosis: Annotated[
         Path | None, typer.Option(help="diagnosis.json: --closed-loop runs the rig as it was diagnosed.")
     ] = None,
@@ -71,7 +75,12 @@ def replay(
     found, remark = read_or_salvage(log)
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
-    if closed_loop or diagnosis is not None:
+    if open_loop:
+        if closed_loop or stepped or set_ or diagnosis is not None:
+            raise InputError("the valves are the recorded ones, so no controller runs", where="--open-loop",
+                             remedy="leave out --closed-loop, --stepped, --set and --diagnosis")  # fmt: skip
+        _open_loop(found, rig, plot)
+    elif closed_loop or diagnosis is not None:
         _closed_loop(found, parse_overrides(set_), diagnosis, rig, plot)
     elif stepped or set_:
         _stepped(found, parse_overrides(set_), _believed(found, rig), output, plot)
@@ -213,6 +222,25 @@ def _closed_loop(
         console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
 
 
+def _open_loop(log: Log, path: Path | None, plot: Path | None) -> None:
+    from pneumo_ros.effects.stepping import stepped_rig
+    from pneumo_ros.plant.stepping import plain_rig
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.session.rerun import draw_rerun, open_loop
+
+    rig = log.config if path is None else load_rig(path)
+    if rig is None:
+        raise InputError("no /rig/config in the log", where=log.path, remedy="give the rig with --rig FILE.yaml")
+    tell_assumed(console, rig, path)
+    result = open_loop(log, rig, stepped_rig if rig.diagnosed else plain_rig)
+    for note in result.notes:
+        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+    console.print(rerun_table(result, "open loop"))
+    if plot is not None:
+        draw_rerun(result, plot, f"{log.path.name}: its road and openings through {rig.name}", "open loop, model")
+        console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
+
+
 def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | None) -> Rerun:
     """From rest, on the log's rig or the given one, with its effects if it has any."""
     from pneumo_ros.effects.stepping import stepped_rig
@@ -243,11 +271,11 @@ def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path,
     return replace(result, notes=(*result.notes, *notes))
 
 
-def rerun_table(result: Rerun) -> Table:
-    """Each measured channel: as recorded, as the model in closed loop gives it."""
+def rerun_table(result: Rerun, how: str = "closed loop") -> Table:
+    """Each measured channel: as recorded, as the model gives it."""
     from pneumo_ros.session.rerun import compare_channels
 
-    table = Table("channel", "unit", "std, recorded", "std, closed loop", "rms difference / std", box=box.SIMPLE_HEAD)
+    table = Table("channel", "unit", "std, recorded", f"std, {how}", "rms difference / std", box=box.SIMPLE_HEAD)
     for name, unit, recorded, ours, gap in compare_channels(result):
         table.add_row(name, unit, f"{recorded:.4g}", f"{ours:.4g}", f"{gap:.3f}")
     return table

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from pneumo_ros.cli.tables import summary_table, timing_table
-from pneumo_ros.errors import InputError
+from pneumo_ros.cli.choices import ALIASES, DEFAULT_CONTROLLER, ROAD_CLASSES, check_controller, check_road
+from pneumo_ros.cli.rig_notes import tell_assumed
+from pneumo_ros.errors import InputError, not_one_of
 
 if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 FAILED = 1
-CONTROLLER = "smflc"
-ALIASES = {CONTROLLER: "default"}
-ROAD_CLASSES = "ABCDEFGH"
+INTERRUPTED = 130  # as a shell says of Ctrl-C
+MIN_SAMPLES = 10  # fewer make no figures
 RIG_NODES = {"sim": "plant", "serial": "daq"}  # source -> the node that is the rig
 
 
@@ -38,7 +38,7 @@ def run(
         typer.Option(
             help="smflc, passive, thesis, two_valve, area_rate_feedforward, or another of docs/parameters.md."
         ),
-    ] = CONTROLLER,
+    ] = DEFAULT_CONTROLLER,
     valves: Annotated[
         Path | None,
         typer.Option(
@@ -50,8 +50,9 @@ def run(
     source: Annotated[str, typer.Option(help="sim: the simulated rig; serial: the hardware.")] = "sim",
     port: Annotated[str, typer.Option(help="Serial port of the hardware, or of pneumo emulate.")] = "/dev/ttyACM0",
     calibration: Annotated[
-        str, typer.Option(help="Of the hardware: name in config/calibration, or a YAML file.")
-    ] = "appendix_c",
+        str | None,
+        typer.Option(help="Of the hardware, which has no default: name in config/calibration, or a YAML file."),
+    ] = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Absolute deadlines instead of lockstep.")] = False,
     single_process: Annotated[bool, typer.Option("--single-process", help="All nodes in one process.")] = False,
     rig: Annotated[
@@ -73,6 +74,10 @@ def run(
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
+    check_road(road)
+    check_controller(controller)
+    if source not in RIG_NODES:
+        raise not_one_of("unknown source", source, RIG_NODES, where="--source")
     from pneumo_ros.cli.view import beside
     from pneumo_ros.session.plan import assign, parse_setting, read_config
 
@@ -84,7 +89,8 @@ def run(
     if valves is not None:
         options.append(("controller", "valve_profile", str(valves.resolve())))
     if source == "serial":
-        options += [("daq", "port", port), ("daq", "calibration", calibration)]
+        options.append(("daq", "port", port))
+        options += [("daq", "calibration", calibration)] if calibration is not None else []
     for node, key, raw in [*options, *(parse_setting(text) for text in set_ or [])]:
         assign(values, tables, node, key, raw, "command line")
     values = {node: own for node, own in values.items() if node in session_nodes(source)}
@@ -93,8 +99,10 @@ def run(
     _finish_plan(values, rig, target, session | ({} if valves is None else {"valves": str(valves)}))
     if source == "serial":
         _check_hardware(values["daq"], single_process)
+        _tell_doubts(Console(), str(values["daq"]["calibration"]))
     checked = _check(values, target)
     console = Console()
+    tell_assumed(console, checked, rig)
     if checked.effects:
         _tell_effects(console, checked, source)
     with beside(domain_id) if view else nullcontext() as dashboard:
@@ -108,7 +116,7 @@ def run(
 def _player(controller: str) -> str:
     from pneumo_ros.control.half_car import PROFILE
 
-    if controller not in (CONTROLLER, PROFILE):
+    if controller not in (DEFAULT_CONTROLLER, PROFILE):
         raise InputError("either a controller or a valve profile", where="--valves", key="--controller",
                          value=controller, remedy="leave one of them out")  # fmt: skip
     return PROFILE
@@ -116,8 +124,6 @@ def _player(controller: str) -> str:
 
 def session_nodes(source: str) -> tuple[str, ...]:
     """Nodes of a session in the order they are stopped."""
-    if source not in RIG_NODES:
-        raise InputError("unknown source", where="--source", value=source, allowed=", ".join(RIG_NODES))
     if source == "serial":  # the valves first: without a controller the driver would rightly trip
         return "daq", "road_profile", "controller", "estimator", "session_recorder"
     return "road_profile", "controller", "estimator", "plant", "session_recorder"
@@ -210,7 +216,7 @@ def _check(values: Values, target: Path) -> Rig:
         standing_effects(rig, library_of(rig))
     _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
-    build_road(own, wheelbase=rig.wheelbase, where="road")
+    build_road(own, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="road")
     if target.suffix != ".mcap":
         raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
     if target.exists():
@@ -241,11 +247,35 @@ def _check_hardware(own: dict[str, Value], single_process: bool) -> None:
 
     if single_process:
         raise InputError("hardware needs a process of its own", where="--single-process", remedy="leave it out")
+    if "calibration" not in own:
+        raise InputError(
+            "hardware needs its own calibration",
+            where="--calibration",
+            allowed="appendix_c, appendix_c_corrected, or a YAML file of pneumo calibrate",
+            remedy="pneumo calibrate --check --calibration NAME says what is doubtful about one",
+        )
     load_calibration(str(own["calibration"]))
     load_safety(str(own.get("safety", "")) or None)
     if not Path(str(own["port"])).exists():
         raise InputError(
             "no such port", where="--port", value=own["port"], remedy="plug it in, or start pneumo emulate"
+        )
+
+
+def _tell_doubts(console: Console, name: str) -> None:
+    """What the check of the calibration doubts on a board as the emulated one, in a line."""
+    from pneumo_ros.daq.calibration_check import check_calibration
+    from pneumo_ros.daq.calibration_file import load_calibration
+    from pneumo_ros.daq.emulator.board import board_identity
+
+    doubts = check_calibration(load_calibration(name), board_identity())
+    if doubts:
+        channels = ", ".join(dict.fromkeys(doubt.channel for doubt in doubts))
+        console.print(
+            f"[yellow]doubtful calibration[/] {name}: {channels}; "
+            f"pneumo calibrate --check --calibration {name} says why",
+            highlight=False,
+            soft_wrap=True,
         )
 
 
@@ -281,7 +311,22 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
             raise typer.Exit(FAILED) from error
         except KeyboardInterrupt:
             progress.stop()
-            console.print("stopped by the user; the log is finished")
+            _tell_stopped(console, target)
+
+
+def _tell_stopped(console: Console, target: Path) -> None:
+    """What became of the log when the user ended the session; an end before the first sample leaves none."""
+    from pneumo_ros.log import topics
+    from pneumo_ros.log.reading import read_log
+
+    if not target.exists():
+        console.print("stopped by the user before the session began: there is no log")
+        raise typer.Exit(INTERRUPTED)
+    found = read_log(target, [topics.DISPLACEMENT.name]).topics.get(topics.DISPLACEMENT.name)
+    if found is None or found.count < MIN_SAMPLES:
+        console.print(f"stopped by the user before there was anything to show; the log holds the start: {target}")
+        raise typer.Exit(INTERRUPTED)
+    console.print("stopped by the user; the log is finished")
 
 
 def _save_what_is_left(target: Path) -> None:
@@ -306,14 +351,20 @@ def _save_what_is_left(target: Path) -> None:
 def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.cli.passive import passive_run
+    from pneumo_ros.cli.tables import summary_table, timing_table
+    from pneumo_ros.log.reading import read_log
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
+    from pneumo_ros.session.warnings import warnings_of
 
     session = load_session(target)
     other = passive_run(session)
-    ours = summarise(session, loop_timing(target), wall_time(target))
+    loop = loop_timing(target)
+    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))
     console.print(timing_table(ours))
+    for line in ours.warnings:
+        console.print(f"[yellow]warning[/]  {line}", highlight=False, soft_wrap=True)
     console.print(f"log      {target}")
     if picture:
         from pneumo_ros.session.picture import draw_session
@@ -322,7 +373,6 @@ def _report(console: Console, target: Path, values: Values, picture: bool, page:
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}")
     if page:
-        from pneumo_ros.log.reading import read_log
         from pneumo_ros.session.report import write_report
 
         html = target.with_suffix(".html")

@@ -30,10 +30,12 @@ def thesis(
 ) -> None:
     """Run the thesis's experiments and write a page: pictures, tables beside the printed ones, claims with verdicts."""
     from pneumo_ros.thesis.book import book
+
+    wanted = book(chapter or ())
     from pneumo_ros.thesis.page import write_claims, write_page
     from pneumo_ros.thesis.settings import load_settings
 
-    wanted, values = book(chapter or ()), load_settings(settings)
+    values = load_settings(settings)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=console, transient=True,

@@ -31,6 +31,9 @@ def view(
     log: Annotated[
         Path | None, typer.Argument(help="Session log (.mcap) or bag folder; without one, the running session.")
     ] = None,
+    other: Annotated[
+        Path | None, typer.Option("--with", help="A second log, laid over the first, aligned by their road.")
+    ] = None,
     host: Host = "127.0.0.1",
     port: Port = 0,
     token: Token = None,
@@ -41,23 +44,29 @@ def view(
     """Serve the dashboard and print its address; Ctrl-C ends it."""
     _need_bokeh()
     if log is not None:
-        view_log(log, host, port, token)
+        view_log(log, host, port, token, other)
     else:
         view_live(host, port, token, domain_id)
 
 
-def view_log(path: Path, host: str, port: int, token: str | None) -> None:
-    """Play a log back; each browser tab has its own position."""
-    from pneumo_ros.dashboard.page import Page
-    from pneumo_ros.dashboard.server import serve
-    from pneumo_ros.dashboard.source import Playback
+def view_log(path: Path, host: str, port: int, token: str | None, other: Path | None = None) -> None:
+    """Play a log back, each browser tab at its own position; a residual log, or two logs, are laid over each other."""
     from pneumo_ros.log.salvage import read_or_salvage
 
     log, remark = read_or_salvage(path)
+    from pneumo_ros.dashboard.overlay import Overlay, is_residual, series_of
+    from pneumo_ros.dashboard.page import Page
+    from pneumo_ros.dashboard.server import serve
+    from pneumo_ros.dashboard.source import Playback
+
     if remark:
         console.print(f"[yellow]{remark}[/]", highlight=False, soft_wrap=True)
-    Playback(log)  # says what is wrong with the log before anybody waits for a page
-    dashboard = serve(lambda document: _keep(Page(document, Playback(log))), host, port, token)
+    if other is not None or is_residual(log):
+        series = series_of(log, None if other is None else read_or_salvage(other)[0])
+        dashboard = serve(lambda document: _keep(Overlay(document, log.path.name, series)), host, port, token)
+    else:
+        Playback(log)  # says what is wrong with the log before anybody waits for a page
+        dashboard = serve(lambda document: _keep(Page(document, Playback(log))), host, port, token)
     console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)
     dashboard.run()
 

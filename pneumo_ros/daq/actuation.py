@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from enum import Enum
+from typing import NamedTuple
 
 from pneumo_ros.daq.frames import Command, CommandFlag, encode
 from pneumo_ros.daq.limits import command_finding
@@ -18,6 +19,7 @@ from pneumo_ros.daq.scaling import OutputScale
 
 SECOND = 1_000_000_000  # ns
 WRAP = 1 << 32
+APPLIED_KEPT = 4096  # openings not fetched yet; more than seconds of them
 SENT_KEPT = 512  # commands whose sending time is remembered for the round trip
 KEEP_ALIVE = 20_000_000  # ns between commands while SAFE
 QUICK = 5_000_000  # ns between commands while a change must get through
@@ -32,6 +34,13 @@ class Mode(Enum):
     ARMED = "armed"
     ESTOP = "estop"
     RESETTING = "resetting"
+
+
+class Applied(NamedTuple):
+    """Openings (m2, in the order of VALVES) as they were sent to the board at ``time_ns``, monotonic."""
+
+    time_ns: int
+    areas: tuple[float, ...]
 
 
 class Actuation:
@@ -52,6 +61,7 @@ class Actuation:
         self.refused = 0
         self.sent_ns: deque[tuple[int, int]] = deque(maxlen=SENT_KEPT)
         self.areas = safety.safe_command
+        self.applied: deque[Applied] = deque(maxlen=APPLIED_KEPT)
         self._sequence = 0
         self._last_send = 0
         self._quick_until = 0
@@ -184,6 +194,7 @@ class Actuation:
             return
         self._sequence = (self._sequence + 1) % WRAP
         self.areas = tuple(areas)
+        self.applied.append(Applied(now, self.areas))
         self._send(encode(Command(self._sequence, flags, self.scale.counts(areas))))
         self.sent += 1
         self.sent_ns.append((self._sequence, now))

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from pneumo_ros.daq.calibration import SENSORS, SensorCalibration, units_of
 from pneumo_ros.errors import InputError
@@ -114,6 +113,8 @@ def fit_points(points: Points, where: object = None) -> Fit:
     InputError
         for too few points, no spread or readings that do not run one way, saying which.
     """
+    from scipy import stats  # here: a second of imports that a missing file need not wait for
+
     _refuse_bad(points, where)
     line = stats.linregress(points.volts, points.reference)
     freedom = len(points.volts) - 2

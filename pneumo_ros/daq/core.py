@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from pneumo_ros.daq.actuation import SECOND, Actuation, Mode
+from pneumo_ros.daq.actuation import SECOND, Actuation, Applied, Mode
 from pneumo_ros.daq.admission import admit
 from pneumo_ros.daq.calibration import Calibration
 from pneumo_ros.daq.calibration_check import check_calibration
@@ -90,11 +90,17 @@ class DriverCore:
     @property
     def pending(self) -> bool:
         """Whether there is something to drain."""
-        return bool(self._out)
+        return bool(self._out or self.actuation.applied)
 
     def drain(self) -> list[Measurement | Event]:
         """Measurements and events since the last call, in order."""
         out, self._out = self._out, []
+        return out
+
+    def drain_applied(self) -> list[Applied]:
+        """What went to the valves since the last call, in order: commands, ramped, and safe ones."""
+        out = list(self.actuation.applied)
+        self.actuation.applied.clear()
         return out
 
     # -- link ------------------------------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 import serial
 
-from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.daq.actuation import Applied, Mode
 from pneumo_ros.daq.calibration import SENSORS, Calibration
 from pneumo_ros.daq.core import DriverCore, Phase
 from pneumo_ros.daq.intake import Measurement
@@ -43,6 +43,7 @@ class SerialDriver:
     safety, calibration, rig : configuration
     on_measurement, on_event : called from the driver's threads, never while a lock is held
     baud : of a UART; USB CDC ignores it
+    on_applied : the same, for every opening that went to the valves
     """
 
     def __init__(
@@ -54,12 +55,13 @@ class SerialDriver:
         on_measurement: Callable[[Measurement], None],
         on_event: Callable[[Event], None],
         baud: int = BAUD,
+        on_applied: Callable[[Applied], None] = lambda _: None,
     ) -> None:
         self.port, self.baud = port, baud
         self.core = DriverCore(safety, calibration, rig, self._write, self._discard)
         self.dropped_writes = 0
         self.lateness_ns: deque[tuple[int, int]] = deque(maxlen=LATENESS_KEPT)  # (when, how late a look was)
-        self._on_measurement, self._on_event = on_measurement, on_event
+        self._on_measurement, self._on_event, self._on_applied = on_measurement, on_event, on_applied
         self._serial: serial.Serial | None = None
         self._lock = threading.RLock()
         self._delivery = threading.Lock()
@@ -193,7 +195,10 @@ class SerialDriver:
         """
         while self.core.pending and self._delivery.acquire(blocking=False):
             try:
-                for item in self._drain():
+                out, applied = self._drain()
+                for opening in applied:
+                    self._on_applied(opening)
+                for item in out:
                     if isinstance(item, Measurement):
                         self._on_measurement(item)
                     else:
@@ -201,13 +206,13 @@ class SerialDriver:
             finally:
                 self._delivery.release()
 
-    def _drain(self) -> list[Measurement | Event]:
+    def _drain(self) -> tuple[list[Measurement | Event], list[Applied]]:
         with self._changed:
-            out = self.core.drain()
+            out, applied = self.core.drain(), self.core.drain_applied()
             if self._collected is not None:
                 self._collected += [item for item in out if isinstance(item, Measurement)]
                 self._changed.notify_all()
-        return out
+        return out, applied
 
     def _read_forever(self) -> None:
         while not self._stop.is_set():

@@ -9,6 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from pneumo_ros.dashboard.panels import SHOWN, Samples
+from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import Event, read_events
 from pneumo_ros.log.reading import JOINT_STATE, Log
@@ -96,6 +97,11 @@ class Playback:
         self._rig = log.config or load_rig()
         self._found = samples_of(log)
         self._events = list(read_events(log))
+        if not self._found:
+            there = ", ".join(f"{name} ({info.count})" for name, info in log.topics.items() if info.count)
+            raise InputError("nothing to show: none of the topics that the dashboard knows", where=log.path,
+                             allowed=", ".join(topic.name for topic in SHOWN),
+                             remedy=f"the log has {there or 'no message'}")  # fmt: skip
         spans = [s.time_ns[[0, -1]] for s in self._found.values() if len(s.time_ns)]
         self.start_ns = int(min((s[0] for s in spans), default=0))
         self.end_ns = int(max((s[1] for s in spans), default=0))

@@ -15,11 +15,12 @@ so that a whole log and a rig that is stepped row by row go through the same lin
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 from pneumo_ros.plant.air_spring import Gas
 from pneumo_ros.plant.half_car import Body
@@ -31,6 +32,10 @@ Memory = Any  # what an effect keeps from one block of rows to the next; None be
 ENDS = ("front", "rear", "both")
 RIG = ("",)
 PRESSURES_OR_BOTH = (*PRESSURES, "both")
+PLACES = (
+    "{end}_force", "{end}_air", "{end}_tyre", "front_force", "rear_force", "front_air", "rear_air", "front_tyre",
+    "rear_tyre", "body_heave", "body_pitch", "road_input", "supply",
+)  # fmt: skip
 SENSOR_PLACES = {name: f"sensor:{name}" for name in CHANNELS}
 
 
@@ -77,6 +82,7 @@ class Effect:
     parameters : those with ``size=True`` are zero when there is no effect
     derived : what they give together
     plant, inputs, outputs, term : hooks, see the module
+    guide : what people want to know of it
     """
 
     id: str
@@ -90,6 +96,27 @@ class Effect:
     outputs: Callable[[Array, float, tuple[int, ...], Values, Memory], tuple[Array, Memory]] | None = None
     undo: Callable[[Array, tuple[int, ...], Values], Array] | None = None
     term: PlantTerm | None = None
+    guide: Guide | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        check_places(self.sites, self.places)
+
+
+def check_places(sites: tuple[str, ...], places: tuple[str, ...]) -> None:
+    """Refuse sites and places that the rig does not have.
+
+    Raises
+    ------
+    ValueError
+        naming it and what there is.
+    """
+    known_sites = (*ENDS, *RIG, *CHANNELS)
+    for site in sites:
+        if site not in known_sites:
+            raise ValueError(f"unknown site {site!r}; allowed: {', '.join(map(repr, known_sites))}")
+    for place in places:
+        if place not in PLACES and not place.startswith("sensor:"):
+            raise ValueError(f"unknown place {place!r}; allowed: {', '.join(PLACES)}")
 
 
 def by_column(

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from pneumo_ros.effects import library
+from pneumo_ros.effects.mistakes import in_effect_file
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,7 +101,7 @@ def _effect_in(path: Path) -> Effect:
         digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
         effect = getattr(module_at(f"pneumo_effect_{path.stem}_{digest}", str(path.resolve())), "EFFECT", None)
     except Exception as error:
-        raise InputError(f"cannot load the effect ({error})", where=path, remedy=remedy) from error
+        raise in_effect_file(error, path) from error
     if not isinstance(effect, Effect):
         raise InputError("defines no EFFECT", where=path, remedy=remedy)
     for hook, wanted in HOOKS.items():

@@ -44,6 +44,14 @@ class EffectParameter:
     starts: tuple[float, ...] = ()
     ends: tuple[float, ...] = (0.0,)
 
+    def __post_init__(self) -> None:
+        if not self.low < self.high:
+            raise ValueError(f"parameter {self.name!r}: low {self.low:g} is not below high {self.high:g}")
+        for word, value in (("typical", self.typical), *(("start", start) for start in self.starts)):
+            if not self.low <= value <= self.high:
+                text = f"parameter {self.name!r}: {word} {value:g} is outside low {self.low:g} to high {self.high:g}"
+                raise ValueError(text)
+
 
 @dataclass(frozen=True)
 class Derived:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ import yaml
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.container import (
+    MAGIC,
     Contents,
     DamageError,
     check_magic,
@@ -20,6 +22,8 @@ from pneumo_ros.log.container import (
 from pneumo_ros.log.records import Gathered, Records, gather
 
 PROFILE = "ros2"
+PART = re.compile(r"(_\d+)?\.mcap(\.zstd)?$")  # how a part's name ends
+SHOWN = 6
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,8 @@ def files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     listed = _listed(path)
-    files = [path / name for name in listed] if listed else sorted([*path.glob("*.mcap"), *path.glob("*.mcap.zstd")])
+    there = sorted([*path.glob("*.mcap"), *path.glob("*.mcap.zstd")])
+    files = [path / name for name in listed] if listed else there
     if not files:
         raise InputError("the folder holds no .mcap file", where=path, remedy="give the folder that ros2 bag wrote")
     for file in files:
@@ -51,7 +56,39 @@ def files_of(path: Path) -> list[Path]:
             raise InputError("a bag in SQLite storage", where=file, remedy="ros2 bag convert makes an MCAP bag of it")
         if not file.exists():
             raise InputError(f"metadata.yaml lists {file.name}, which is not there", where=path)
+    _ask_which(path, there, files if listed else [])
     return files
+
+
+def _ask_which(folder: Path, there: list[Path], listed: list[Path]) -> None:
+    """Several logs in a folder are no log; the numbered parts of one, as rosbag2 splits it, are."""
+    series = {PART.sub("", file.name) for file in there}
+    others = sorted(file.name for file in there if file not in listed)
+    if (listed and others) or (not listed and len(series) > 1):
+        names = sorted(file.name for file in there)
+        shown = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+        raise InputError("the folder holds several logs", where=folder, allowed=shown,
+                         remedy=f"say which, for example {folder / names[0]}")  # fmt: skip
+
+
+def check_log(path: Path) -> None:
+    """See in a moment that a log is there and is one, before what would read it is imported.
+
+    Raises
+    ------
+    InputError
+        as :func:`files_of`, or if a file begins with other bytes than MCAP's.
+    """
+    for file in files_of(path):
+        if file.suffix == ".zstd":
+            continue
+        try:
+            with file.open("rb") as stream:
+                check_magic(stream.read(len(MAGIC)), file)
+        except OSError as error:
+            raise InputError(
+                f"cannot read the log ({error.strerror})", where=file, remedy="check its rights"
+            ) from error
 
 
 def _listed(folder: Path) -> list[str]:

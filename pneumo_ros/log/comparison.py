@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from pneumo_ros.log.inspection import final_parameters
 from pneumo_ros.log.reading import CONFIG_TOPIC, Log
 from pneumo_ros.log.tables import Table, table
+from pneumo_ros.log.topics import BY_NAME, ROAD, Topic
 
 _KEYS = ("log_time_ns", "stamp_ns")
+ROAD_STEP, MIN_ROAD = 2e-3, 100  # s and samples of a road that is compared
+SAME_ROAD = 0.95  # correlation
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,10 @@ class Signal:
     ----------
     topic, column : what
     mean, std : of each log
-    common : messages at equal time since the logs' start
+    common : samples compared: those at equal times, or where hardly any are, all of the first log's in the overlap
     largest : largest difference over those, NaN if there are none
     rms : rms difference over those
+    unit : of the column, where the table of topics states one
     """
 
     topic: str
@@ -46,6 +50,7 @@ class Signal:
     common: int
     largest: float
     rms: float
+    unit: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,8 @@ class Comparison:
     identical : topics whose serialised messages are equal, byte by byte
     settings : rig parameters, node parameters and metadata that differ
     signals : columns of the shared topics
+    roads : "same", "two", or "" where a log has none that moves
+    offset : s that the second log is shifted by, so that both meet the road at once
     """
 
     only_first: tuple[str, ...]
@@ -67,16 +74,19 @@ class Comparison:
     identical: tuple[str, ...]
     settings: tuple[Difference, ...]
     signals: tuple[Signal, ...]
+    roads: str = ""
+    offset: float = 0.0
 
 
 def compare(first: Log, second: Log) -> Comparison:
-    """Compare two logs, each on its own time since its first message.
+    """Compare two logs, each on its own time since its first sample, aligned by the road where it is the same.
 
     Raises
     ------
     InputError
         if a topic does not decode.
     """
+    roads, offset = align(first, second)
     shared = [name for name in first.topics if name in second.topics]
     return Comparison(
         only_first=tuple(name for name in first.topics if name not in second.topics),
@@ -84,8 +94,39 @@ def compare(first: Log, second: Log) -> Comparison:
         counts={name: (first.topics[name].count, second.topics[name].count) for name in shared},
         identical=tuple(name for name in shared if same_payload(first, second, name)),
         settings=tuple(_settings(first, second)),
-        signals=tuple(s for name in shared for s in _signals(first, second, name)),
+        signals=tuple(s for name in shared for s in _signals(first, second, name, round(offset * 1e9))),
+        roads=roads,
+        offset=offset,
     )
+
+
+def align(first: Log, second: Log) -> tuple[str, float]:
+    """("same", "two" or "", s by which the second log is late) from the front road of both.
+
+    A road is the same if, shifted to where both agree best, it correlates by :data:`SAME_ROAD`.
+    """
+    roads = [_road(log) for log in (first, second)]
+    if any(len(road) < MIN_ROAD or np.std(road) == 0.0 for road in roads):
+        return "", 0.0
+    a, b = ((road - road.mean()) / np.std(road) for road in roads)
+    size = 2 ** int(np.ceil(np.log2(len(a) + len(b))))
+    agreement = np.fft.irfft(np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size), size)
+    lag = int(np.argmax(agreement))
+    lag -= size if lag > size // 2 else 0
+    overlap = min(len(a), len(b) - lag) - max(0, -lag)
+    if agreement.max() < SAME_ROAD * max(overlap, 0.5 * min(len(a), len(b))):
+        return "two", 0.0
+    return "same", lag * ROAD_STEP
+
+
+def _road(log: Log) -> NDArray[np.float64]:
+    """The front road from the log's start on an even base of :data:`ROAD_STEP`."""
+    if ROAD.name not in log.topics or log.topics[ROAD.name].count < MIN_ROAD:
+        return np.empty(0)
+    joint = log.select(ROAD.name, ["front"])
+    time = (joint.stamp_ns - start_of(log)) * 1e-9
+    grid = np.arange(0.0, time[-1], ROAD_STEP)
+    return np.asarray(np.interp(grid, time, np.nan_to_num(joint.position[:, 0])))
 
 
 def same_payload(first: Log, second: Log, topic: str) -> bool:
@@ -119,37 +160,59 @@ def _differences(where: str, first: dict[str, Any], second: dict[str, Any]) -> I
             yield Difference(where, key, first.get(key), second.get(key))
 
 
-def _signals(first: Log, second: Log, topic: str) -> Iterator[Signal]:
+def _signals(first: Log, second: Log, topic: str, offset: int) -> Iterator[Signal]:
     infos = (first.topics[topic], second.topics[topic])
     if infos[0].type != infos[1].type or any(i.encoding != "cdr" or i.count < 2 for i in infos):
         return
     a, b = table(first, topic), table(second, topic)
-    rows_a, rows_b = _common(a["stamp_ns"] - _start(first), b["stamp_ns"] - _start(second))
+    times = (a["stamp_ns"] - start_of(first), b["stamp_ns"] - start_of(second) - offset)
+    known = BY_NAME.get(topic)
     for column in a:
         if column not in _KEYS and column in b and _numeric(a, column) and _numeric(b, column):
-            yield _signal(topic, column, a[column], b[column], rows_a, rows_b)
+            yield _signal(topic, column, (a[column], b[column]), times, _unit(known, column))
+
+
+def _unit(topic: Topic | None, column: str) -> str:
+    name, _, kind = column.partition(".")
+    units = dict(topic.fields) if topic is not None else {}
+    unit = units.get(column) or units.get(kind) or units.get(name, "")
+    return f"{unit}/s" if unit and "velocity" in column.split(".") else unit
 
 
 def _signal(
-    topic: str,
-    column: str,
-    a: NDArray[Any],
-    b: NDArray[Any],
-    rows_a: NDArray[np.intp],
-    rows_b: NDArray[np.intp],
-) -> Signal:
-    gap = np.abs(a[rows_a].astype(float) - b[rows_b].astype(float))
+    topic: str, column: str, values: tuple[NDArray[Any], NDArray[Any]], times: tuple[NDArray[Any], NDArray[Any]],
+    unit: str,
+) -> Signal:  # fmt: skip
+    a, b = (np.asarray(one, dtype=float) for one in values)
+    gap = _gap(a, b, *times)
     largest, rms = (float(gap.max()), float(np.sqrt(np.mean(gap**2)))) if len(gap) else (np.nan, np.nan)
-    mean, std = (float(np.mean(a)), float(np.mean(b))), (float(np.std(a)), float(np.std(b)))
-    return Signal(topic, column, mean, std, len(gap), largest, rms)
+    (mean_a, std_a), (mean_b, std_b) = _moments(a), _moments(b)
+    return Signal(topic, column, (mean_a, mean_b), (std_a, std_b), len(gap), largest, rms, unit)
+
+
+def _moments(values: NDArray[np.float64]) -> tuple[float, float]:
+    there = values[np.isfinite(values)]
+    return (float(np.mean(there)), float(np.std(there))) if len(there) else (float("nan"), float("nan"))
+
+
+def _gap(a: NDArray[np.float64], b: NDArray[np.float64], at: NDArray[Any], bt: NDArray[Any]) -> NDArray[np.float64]:
+    """Differences at equal times; where hardly any are equal, from the second log interpolated in the overlap."""
+    rows_a, rows_b = _common(at, bt)
+    if 2 * len(rows_a) >= min(len(a), len(b)):
+        gap = np.abs(a[rows_a] - b[rows_b])
+    else:
+        inside = (at >= bt.min()) & (at <= bt.max())
+        order = np.argsort(bt, kind="stable")
+        gap = np.abs(a[inside] - np.interp(at[inside], bt[order], b[order]))
+    return np.asarray(gap[np.isfinite(gap)])
 
 
 def _numeric(content: Table, column: str) -> bool:
     return content[column].dtype.kind in "biuf"
 
 
-def _start(log: Log) -> int:
-    """The first stamp of the periodic topics, ns: both logs start at 0 s."""
+def start_of(log: Log) -> int:
+    """The first stamp of the periodic topics, ns: every log's time is told from there."""
     stamps = [
         int(log.columns(name).stamp_ns.min())
         for name, info in log.topics.items()

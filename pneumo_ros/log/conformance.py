@@ -94,7 +94,7 @@ def _config(log: Log) -> Iterator[Finding]:
         yield Finding("error", CONFIG_TOPIC, "no message")
         return
     yield Finding("ok", CONFIG_TOPIC, f"rig {rig.name!r}, {len(LIMITS)} parameters")
-    missing = [name for name in LIMITS if f"{name}:" not in texts[-1]]
+    missing = list(rig.assumed)
     if missing:
         yield Finding("warning", CONFIG_TOPIC, f"leaves out {', '.join(missing)}: nominal values are taken")
     if len(set(texts)) > 1:

@@ -85,7 +85,7 @@ class TopicReport:
 
 @dataclass(frozen=True)
 class Event:
-    """An entry of /rig/events: log time in ns, level, node, reason code, text, further values."""
+    """An entry of /rig/events: log time in ns, level, node, reason code, text, further values; header's instant, ns."""
 
     time_ns: int
     level: int
@@ -93,6 +93,7 @@ class Event:
     code: str
     message: str
     values: dict[str, str]
+    stamp_ns: int = 0
 
 
 @dataclass(frozen=True)
@@ -174,8 +175,8 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
         stamps, logged = columns.stamp_ns, columns.log_time_ns
     else:
         stamps = logged = log.records(name).log_time_ns
-    # Events and health come from several nodes at once: their stamps say nothing about a rate.
-    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY
+    # Events and health come from several nodes at once, openings when they change: their stamps say nothing of a rate.
+    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY and name != topics.APPLIED.name
     timing = measure_timing(stamps, logged, log.records(name).disordered) if periodic else None
     first, last = (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
     return TopicReport(name, info.type, info.count, first, last, info.qos, timing)
@@ -245,10 +246,11 @@ def read_events(log: Log) -> Iterator[Event]:
     if name not in log.topics or log.topics[name].type != DIAGNOSTIC_ARRAY:
         return
     for time_ns, message in log.messages(name):
+        stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
         for status in message.status:
             values = {pair.key: pair.value for pair in status.values}
             code = values.pop("code", "")
-            yield Event(time_ns, int(status.level), status.name, code, status.message, values)
+            yield Event(time_ns, int(status.level), status.name, code, status.message, values, stamp)
 
 
 def seed_of(log: Log) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,10 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.errors import InputError
-from pneumo_ros.log.reading import JOINT_STATE, Columns, Joint, Log
+from pneumo_ros.errors import InputError, not_one_of
+from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, Columns, Joint, Log
 
 Table = dict[str, NDArray[Any]]
+MERGED = (JOINT_STATE, FLUID_PRESSURE)
+RIG_SENSORS = ("/rig/displacement", "/rig/front/pressure", "/rig/rear/pressure")
+HELD = ("/valve/command", "/valve/applied")
 
 
 def table(log: Log, topic: str) -> Table:
@@ -72,7 +76,7 @@ def export(
     ----------
     log : from :func:`pneumo_ros.log.reading.read_log`
     folder : created if missing
-    kind : csv, or parquet (needs pyarrow)
+    kind : csv, mat (MATLAB 5), or parquet (needs pyarrow)
     topics : all by default
 
     Raises
@@ -80,9 +84,8 @@ def export(
     InputError
         an unknown kind or topic, pyarrow missing, a file that exists already or cannot be written.
     """
-    writers: dict[str, Callable[[Path, Table], None]] = {"csv": _write_csv, "parquet": _write_parquet}
-    if kind not in writers:
-        raise InputError("unknown format", key="format", value=kind, allowed=", ".join(writers))
+    if kind not in WRITERS:
+        raise not_one_of("unknown format", kind, WRITERS, key="format")
     wanted = list(topics) if topics else [name for name, info in log.topics.items() if info.encoding == "cdr"]
     targets = [folder / file_name(name, f".{kind}") for name in wanted]
     for target in targets:
@@ -93,11 +96,79 @@ def export(
         part = target.with_name(target.name + ".part")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            writers[kind](part, content)
+            WRITERS[kind](part, content)
             part.replace(target)
         except OSError as error:
             raise InputError(f"cannot write ({error.strerror})", where=target) from error
     return targets
+
+
+def merged(log: Log, topics: Sequence[str] | None = None) -> Table:
+    """One table with a row a sample of the fastest measured topic; columns are named ``topic/column``.
+
+    ``time`` is s from the first row, ``stamp_ns`` its instant. Numbers of other topics are linear between their samples
+    (commands and openings are held) and NaN outside them; texts and topics without a rate are left out.
+
+    Raises
+    ------
+    InputError
+        if no topic has samples to merge.
+    """
+    wanted = [name for name in (topics or log.topics) if log.info(name).encoding == "cdr" and log.info(name).count > 1]
+    found = {name: table(log, name) for name in wanted if log.info(name).type in MERGED}
+    if not found:
+        raise InputError("no topic has numbers to merge", where=log.path, allowed=", ".join(log.topics))
+    measured = [name for name in found if name in RIG_SENSORS] or list(found)
+    base = np.unique(found[max(measured, key=lambda name: len(found[name]["stamp_ns"]))]["stamp_ns"])
+    out: Table = {"time": (base - base[0]) * 1e-9, "stamp_ns": base}
+    for name, columns in found.items():
+        stamps, rows = np.unique(columns["stamp_ns"], return_index=True)
+        for column, values in columns.items():
+            if column not in ("log_time_ns", "stamp_ns") and values.dtype.kind in "biuf":
+                out[f"{name}/{column}"] = _at(base, stamps, values[rows].astype(float), name in HELD)
+    return out
+
+
+def _at(base: NDArray[Any], stamps: NDArray[Any], values: NDArray[Any], held: bool) -> NDArray[Any]:
+    inside = (base >= stamps[0]) & (base <= stamps[-1])
+    if held:
+        found = values[np.clip(np.searchsorted(stamps, base, side="right") - 1, 0, None)]
+    else:
+        # From the first stamp: differences of ns since the epoch are exact, the epoch's float64 is not.
+        found = np.interp((base - stamps[0]).astype(float), (stamps - stamps[0]).astype(float), values)
+    return np.where(inside, found, np.nan)
+
+
+def export_merged(
+    log: Log, folder: Path, kind: str = "csv", topics: Sequence[str] | None = None, overwrite: bool = False
+) -> Path:
+    """Write :func:`merged` as ``<log>.<kind>``; arguments and errors as of :func:`export`."""
+    if kind not in WRITERS:
+        raise not_one_of("unknown format", kind, WRITERS, key="format")
+    target = folder / f"{log.path.stem}.{kind}"
+    if target.exists() and not overwrite:
+        raise InputError("the file exists already", where=target, remedy="choose another folder, or --overwrite")
+    part = target.with_name(target.name + ".part")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        WRITERS[kind](part, merged(log, topics))
+        part.replace(target)
+    except OSError as error:
+        raise InputError(f"cannot write ({error.strerror})", where=target) from error
+    return target
+
+
+def _write_mat(path: Path, content: Table) -> None:
+    """Column vectors; MATLAB's names have letters, digits and underscores, 63 at most."""
+    from scipy.io import savemat
+
+    names: dict[str, str] = {}
+    for column in content:
+        name = re.sub(r"\W", "_", column.strip("/")).lstrip("_0123456789")[-60:].lstrip("_0123456789") or "x"
+        names[column] = name if name not in names.values() else f"{name}_{len(names)}"[-63:]
+    values = {names[c]: _plain(v) if v.dtype == object else v for c, v in content.items()}
+    with path.open("wb") as stream:
+        savemat(stream, values, oned_as="column", do_compression=True)
 
 
 def _write_csv(path: Path, content: Table) -> None:
@@ -126,3 +197,7 @@ def _write_parquet(path: Path, content: Table) -> None:
         raise InputError("Parquet needs pyarrow", remedy="pip install 'pneumo_ros[parquet]', or export csv") from error
     columns = {name: _plain(v) if v.dtype == object else np.ascontiguousarray(v) for name, v in content.items()}
     pyarrow.parquet.write_table(pyarrow.table(columns), path)
+
+
+WRITERS: dict[str, Callable[[Path, Table], None]] = {"csv": _write_csv, "parquet": _write_parquet, "mat": _write_mat}
+"""Format -> what writes a table in it."""

@@ -146,6 +146,12 @@ SUPPLY_PRESSURE = Topic(
     "/rig/supply/pressure", PRESSURE, "air supply, absolute (hardware only)", "daq",
     frame_id="supply", fields=(("fluid_pressure", "Pa"), ("variance", "Pa2")),
 )  # fmt: skip
+APPLIED = Topic(
+    "/valve/applied", JOINT,
+    "orifice areas sent to the valves, stamped when they were: the command after ramp, refusals and trips "
+    "(hardware only)",
+    "daq", frame_id="manifold", fields=COMMAND.fields,
+)  # fmt: skip
 CALIBRATION = Topic(
     "/rig/calibration", STRING, "calibration in use, YAML, at start and after zero or span (hardware only)", "daq",
     flow=Flow.EVENTS,
@@ -153,7 +159,7 @@ CALIBRATION = Topic(
 
 TOPICS: tuple[Topic, ...] = (
     ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
-    EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, CALIBRATION,
+    EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, APPLIED, CALIBRATION,
 )  # fmt: skip
 MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
 BY_NAME = {topic.name: topic for topic in TOPICS}

@@ -94,7 +94,7 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         """Open the port and shake hands."""
         driver = SerialDriver(
             self.values["port"], self.safety, self.calibration, self.rig, self.output.send, self._on_event,
-            self.values["baud"],
+            self.values["baud"], self.output.send_applied,
         )  # fmt: skip
         try:
             driver.open()

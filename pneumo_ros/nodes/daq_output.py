@@ -1,9 +1,10 @@
-"""Measurements of the driver as messages: the plant's topics, raw counts, supply pressure."""
+"""What the driver measures and applies as messages: the plant's topics, raw counts, supply pressure, openings."""
 
 from __future__ import annotations
 
 import time
 
+from pneumo_ros.daq.actuation import Applied
 from pneumo_ros.daq.frames import DeviceState
 from pneumo_ros.daq.intake import Measurement
 from pneumo_ros.log import topics
@@ -57,11 +58,17 @@ class MeasurementOutput:
         self.withheld = 0
         self._wall = wall
         variance = rig.pressure_noise.value**2
-        self._joint = {t: JointEncoder(t.frame_id, t.names) for t in (topics.DISPLACEMENT, topics.RAW)}
+        joints = (topics.DISPLACEMENT, topics.RAW, topics.APPLIED)
+        self._joint = {t: JointEncoder(t.frame_id, t.names) for t in joints}
         pressures = (topics.FRONT_PRESSURE, topics.REAR_PRESSURE, topics.SUPPLY_PRESSURE)
         self._pressures = [PressureEncoder(t.frame_id, variance) for t in pressures]
         self._send_joint = {t: node.publisher(t).publish for t in self._joint}
         self._send_pressure = [node.publisher(t).publish for t in pressures]
+
+    def send_applied(self, applied: Applied) -> None:
+        """Publish an opening that went to the valves, stamped when it did; called from the driver's threads."""
+        stamp = self._wall.ros(applied.time_ns)
+        self._send_joint[topics.APPLIED](self._joint[topics.APPLIED].encode(stamp, applied.areas))
 
     def send(self, measurement: Measurement) -> None:
         """Publish one measurement; called from the driver's thread."""

@@ -28,7 +28,9 @@ class RoadProfileNode(RigNode):
         super().__init__("road_profile", PARAMETERS, context=context, overrides=overrides)
         rig = load_rig(self.values["rig"] or None)
         wanted = {p.name: self.values[p.name] for p in PARAMETERS}
-        self.road = build_road(wanted, wheelbase=rig.wheelbase, where=self.get_name())
+        self.road = build_road(
+            wanted, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where=self.get_name()
+        )
         self._encode = JointEncoder(topics.ROAD.frame_id, topics.ROAD.names, with_velocity=True).encode
         self._publish = self.publisher(topics.ROAD).publish
         self._start: int | None = None

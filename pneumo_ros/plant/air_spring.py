@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
@@ -85,6 +84,8 @@ def build_surface(
     pressures : (P,) Pa gauge, increasing
     areas : (H, P) m2
     """
+    from scipy.interpolate import PchipInterpolator  # here: it takes longer to import than the rest of the rig
+
     columns = []
     for column in areas.T:
         curve = PchipInterpolator(heights, column)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, inlet_flow, load_surface, outlet_flow
@@ -90,6 +89,8 @@ def _pressure_for(load: float, rig: Rig, surface: AreaSurface, side: str) -> flo
             allowed=f"a gauge pressure between {0.1 * PSI:.4g} Pa and the supply's {top:.4g} Pa that balances the load",
             remedy="raise supply_pressure or lower sprung_mass or design_height",
         )
+    from scipy.optimize import brentq  # here: slow to import, and wanted once a rig
+
     return float(brentq(missing, 0.1 * PSI, top, xtol=1e-7, rtol=1e-14)) + ambient
 
 

@@ -31,8 +31,12 @@ def mean_personal_rating(vertical_rms: float, lateral_rms: float = 0.0) -> float
 
     The regression exceeds the scale of its raters below 0.011 g and is negative above 0.136 g.
     """
-    rating = 5.43 - 40.0 * float(np.hypot(vertical_rms, lateral_rms)) / GRAVITY
-    return min(max(rating, MPR_RANGE[0]), MPR_RANGE[1])
+    return min(max(rating_regression(vertical_rms, lateral_rms), MPR_RANGE[0]), MPR_RANGE[1])
+
+
+def rating_regression(vertical_rms: float, lateral_rms: float = 0.0) -> float:
+    """The regression of :func:`mean_personal_rating` as it comes, also where it leaves its raters' scale."""
+    return 5.43 - 40.0 * float(np.hypot(vertical_rms, lateral_rms)) / GRAVITY
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class Ride:
     heave_rms, pitch_rms : acceleration of the rig's body, m/s2 and rad/s2
     full_scale_heave_rms : m/s2, the rig's times the length scale
     rating : MPR of it, 0 to 5
+    rated : whether the regression stays inside that range; where it does not, its end stands in ``rating``
+    scale : full scale over the rig
     tyre_load_variation : (2,) front and rear standard deviation of tyre force over its static value
     workspace : (2,) front and rear largest minus smallest spring height, m
     """
@@ -54,6 +60,8 @@ class Ride:
     rating: float
     tyre_load_variation: tuple[float, float]
     workspace: tuple[float, float]
+    rated: bool = True
+    scale: float = LENGTH_SCALE
 
 
 def tyre_load_variation(force: ArrayLike, static: float) -> float:
@@ -72,6 +80,7 @@ def judge(
     tyre_forces: NDArray[np.float64],
     static_loads: tuple[float, float],
     heights: NDArray[np.float64],
+    scale: float = LENGTH_SCALE,
 ) -> Ride:
     """Judge a run.
 
@@ -80,9 +89,10 @@ def judge(
     heave_acceleration, pitch_acceleration : (N,) of the rig, m/s2 and rad/s2
     tyre_forces, heights : (N, 2) front and rear, N and m
     static_loads : front and rear, N
+    scale : full-scale vehicle over the rig, in length
     """
     heave = rms(heave_acceleration)
-    full = heave * LENGTH_SCALE
+    full = heave * scale
     variation = [tyre_load_variation(tyre_forces[:, i], static_loads[i]) for i in (0, 1)]
     return Ride(
         heave,
@@ -91,4 +101,6 @@ def judge(
         mean_personal_rating(full),
         (variation[0], variation[1]),
         (workspace(heights[:, 0]), workspace(heights[:, 1])),
+        MPR_RANGE[0] < rating_regression(full) < MPR_RANGE[1],
+        scale,
     )

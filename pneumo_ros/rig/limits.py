@@ -41,10 +41,14 @@ LIMITS: dict[str, Limit] = {
     "discharge_coefficient": Limit("1", 0.05, 2.0, "factor on every orifice area"),
     "displacement_noise": Limit("m", 0.0, 0.01, "standard deviation of white LVDT noise"),
     "pressure_noise": Limit("Pa", 0.0, 1e5, "standard deviation of white pressure noise"),
+    "length_scale": Limit("1", 0.01, 100.0, "full-scale vehicle over the rig, in length; time scale 1"),
     "model_form": Limit(
         "1", 0.0, 0.5, "share of each channel's std below which a difference is no effect to its maker"
     ),
 }
+
+OPTIONAL = {"length_scale": 5.0, "model_form": 0.0}
+"""Numbers that a text may leave out, and what that means: the first is the thesis's Honda Civic over its rig."""
 
 # What an end may have of its own where the rig has one number for both, or where the command is not what happens.
 END_LIMITS: dict[str, Limit] = {

@@ -5,12 +5,12 @@ Nothing else in the package holds a number of the rig.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
 
-from pneumo_ros.rig.limits import END_LIMITS, LIMITS, checked, limit_of
+from pneumo_ros.rig.limits import END_LIMITS, LIMITS, OPTIONAL, checked, limit_of
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class Rig:
 
     ``ends`` (name of :data:`END_LIMITS`, value) and ``effects`` are what a diagnosis found beyond these numbers: a
     simulation with them behaves as the rig that was diagnosed. Controllers and estimators believe the numbers.
+    ``assumed`` names the numbers that the text it was read from leaves out: the thesis's rig's stand in.
     """
 
     name: str
@@ -84,9 +85,11 @@ class Rig:
     discharge_coefficient: Quantity
     displacement_noise: Quantity
     pressure_noise: Quantity
+    length_scale: Quantity = Quantity(5.0, 0.0, "1")
     model_form: Quantity = Quantity(0.0, 0.0, "1")
     ends: tuple[tuple[str, float], ...] = ()
     effects: tuple[NamedEffect, ...] = ()
+    assumed: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def diagnosed(self) -> bool:
@@ -126,8 +129,8 @@ class Rig:
         out: dict[str, Any] = {"name": self.name}
         for name in LIMITS:
             q: Quantity = getattr(self, name)
-            if name == "model_form" and q.value == 0.0:
-                continue  # absent means zero, as in the logs of others
+            if OPTIONAL.get(name) == q.value:
+                continue  # absent means this, as in the logs of others
             out[name] = {"value": q.value, "std": q.std, "unit": q.unit}
         return out
 

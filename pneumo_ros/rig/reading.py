@@ -11,7 +11,7 @@ import yaml
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
-from pneumo_ros.rig.limits import END_LIMITS, LIMITS, checked, limit_of, number
+from pneumo_ros.rig.limits import END_LIMITS, LIMITS, OPTIONAL, checked, limit_of, number
 from pneumo_ros.rig.parameters import NamedEffect, Quantity, Rig
 
 
@@ -102,11 +102,12 @@ def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:
     for key in entries:
         if key not in known:
             limit_of(str(key), where)
-    base = {"model_form": {"value": 0.0, "unit": "1"}}
+    base: dict[str, Any] = {name: {"value": value, "unit": "1"} for name, value in OPTIONAL.items()}
     base |= {} if known - set(base) <= set(entries) else _nominal_entries()
     quantities = {name: _quantity(name, entries.get(name, base.get(name)), where) for name in LIMITS}
     name = str(entries.get("name", base.get("name", "unnamed")))
-    return Rig(name=name, **quantities)  # type: ignore[arg-type]  # ends and effects keep their defaults
+    left_out = tuple(key for key in LIMITS if key not in entries and key not in OPTIONAL)
+    return Rig(name=name, assumed=left_out, **quantities)  # type: ignore[arg-type]  # ends, effects: their defaults
 
 
 def _nominal_entries() -> dict[str, Any]:

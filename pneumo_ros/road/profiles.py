@@ -57,6 +57,7 @@ class RoadSpec:
     ramp : time over which iso, sine and sweep grow in smoothly, s
     rear_delay : s; wheelbase over speed, 0 for axles in phase
     path : CSV file with columns time, front[, rear] in s and m (kind file)
+    length_scale : full-scale vehicle over the rig
     """
 
     kind: str = "iso"
@@ -73,6 +74,7 @@ class RoadSpec:
     ramp: float = 1.0
     rear_delay: float = 0.1143
     path: str = ""
+    length_scale: float = LENGTH_SCALE
 
     def to_yaml(self) -> str:
         """The text a session log carries."""
@@ -117,11 +119,21 @@ class Road:
         return np.column_stack([zf, zr]), np.column_stack([vf, vr])
 
 
-def build_road(values: dict[str, Value] | None = None, *, wheelbase: float, where: object = "road") -> Road:
-    """A road from parameters (names of :data:`PARAMETERS`); the rear delay follows from the rig's wheelbase, m."""
+def build_road(
+    values: dict[str, Value] | None = None,
+    *,
+    wheelbase: float,
+    length_scale: float = LENGTH_SCALE,
+    where: object = "road",
+) -> Road:
+    """A road from parameters (names of :data:`PARAMETERS`) and the rig's wheelbase, m, and scale.
+
+    The rear delay follows from both and the full-scale speed.
+    """
     checked = settings(PARAMETERS, values, where)
-    speed = float(checked["speed_kmh"]) * KMH / LENGTH_SCALE
-    return make_road(RoadSpec(**checked, rear_delay=wheelbase / speed), where)  # type: ignore[arg-type]
+    speed = float(checked["speed_kmh"]) * KMH / length_scale
+    spec = RoadSpec(**checked, rear_delay=wheelbase / speed, length_scale=length_scale)  # type: ignore[arg-type]
+    return make_road(spec, where)
 
 
 def make_road(spec: RoadSpec, where: object = "road") -> Road:
@@ -237,7 +249,7 @@ def _grown(spec: RoadSpec, shape: Shape) -> Shape:
 
 def _iso(spec: RoadSpec) -> Shape:
     w, a, p = iso_components(spec)
-    a = a / LENGTH_SCALE
+    a = a / spec.length_scale
     return _grown(spec, lambda t: _cosines(t, w, a, p))
 
 

@@ -19,7 +19,8 @@ def passive_session(session: Recorded, stepped: SteppedRig | None = None) -> Rec
     car, trim = nominal_half_car(session.rig)
     period = road_period(session)
     count = len(session.road) - 1
-    every = max(1, round(float(np.median(np.diff(session.truth_time))) / period))
+    shown = session.truth_time if len(session.truth_time) > 1 else session.measured_time
+    every = max(1, round(float(np.median(np.diff(shown))) / period))
     rows = np.arange(0, count + 1, every)
     times = np.asarray(rows * period, dtype=np.float64)
     if stepped is None:

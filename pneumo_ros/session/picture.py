@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from pneumo_ros.paths import finished
 from pneumo_ros.rig.channels import ESTIMATED_AREAS, HEAVE, PITCH, TRUE_AREAS, TRUE_TYRE_FORCES
-from pneumo_ros.session.summary import Recorded, static_tyre_loads
+from pneumo_ros.session.summary import Recorded, measured_tyre_forces, static_tyre_loads
 from pneumo_ros.units import DEGREE
 
 FRONT, REAR, GREY = "#1f77b4", "#d62728", "#9a9a9a"
@@ -61,9 +61,13 @@ def _motion(heave: Axes, pitch: Axes, session: Recorded, passive: Recorded | Non
 
 
 def _tyres(axis: Axes, session: Recorded) -> None:
+    forces = measured_tyre_forces(session)
     for side, (name, colour) in enumerate((("front", FRONT), ("rear", REAR))):
         if len(session.truth):
             axis.plot(session.truth_time, session.truth[:, TRUE_TYRE_FORCES[side]], color=colour, lw=0.8, label=name)
+        elif len(session.measured):
+            label = f"{name}, from the LVDT"
+            axis.plot(session.measured_time, forces[:, side], color=colour, lw=0.8, label=label)
         axis.axhline(static_tyre_loads(session.rig)[side], color=colour, lw=0.7, ls=":", label=f"{name}, at rest")
     axis.axhline(0.0, color="k", lw=0.7)
     axis.set_ylabel("tyre force (N)\n0: contact lost")

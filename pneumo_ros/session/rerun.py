@@ -106,6 +106,40 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     )
 
 
+def open_loop(log: Log, rig: Rig, build: Build = plain_rig) -> Rerun:
+    """The recorded road and the recorded openings through a rig, from its rest: nothing reacts to anything.
+
+    The openings that were applied count where the log has them (hardware), else the commanded ones.
+
+    Raises
+    ------
+    InputError
+        if road, valves or measurements are missing.
+    """
+    valves = topics.APPLIED if has(log, topics.APPLIED) else topics.COMMAND
+    for needed in (topics.ROAD, valves):
+        if not has(log, needed):
+            raise InputError("not in the log, so nothing can be played", where=log.path, key=needed.name,
+                             remedy=f"record {needed.name}")  # fmt: skip
+    notes: list[str] = []
+    period = control_period(log, list(read_setups(log)), notes)
+    measured, sent = measurements(log), track(log, valves)
+    start = int(measured.stamp_ns[0])
+    road = _road(log, start, int(measured.stamp_ns[-1]), period)
+    times = np.arange(len(road), dtype=np.float64) * period
+    held = np.searchsorted((sent.stamp_ns - start) * 1e-9, times + 1e-9, side="right") - 1
+    commands = sent.values[np.clip(held, 0, None)]
+    stepped = build(rig, period)
+    state, channels = stepped.init(), np.empty((len(road), len(CHANNELS)))
+    for i in range(len(road)):
+        channels[i] = stepped.read(state)
+        if i + 1 < len(road):
+            state = stepped.step(state, commands[i], road[i : i + 2])
+    notes.append(f"open loop: the recorded road and {valves.name}; the run starts from rest at the trim, without noise")
+    recorded = (measured.stamp_ns - start) * 1e-9
+    return Rerun(times, channels, commands, recorded, measured.values, tuple(notes))
+
+
 def close_stepped(
     rig: SteppedRig, stages: tuple[Stage, Stage], road: NDArray[np.float64], noise: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -152,13 +186,13 @@ def compare_channels(result: Rerun) -> list[tuple[str, str, float, float, float]
     return rows
 
 
-def draw_rerun(result: Rerun, path: Path, title: str) -> None:
+def draw_rerun(result: Rerun, path: Path, title: str, label: str = "closed loop, model") -> None:
     """The measured channels as recorded and as run again, as a PNG."""
     figure, axes = plt.subplots(len(CHANNELS), 1, figsize=(11, 13), sharex=True, constrained_layout=True)
     for k, (axis, name, unit) in enumerate(zip(axes, CHANNELS, UNITS, strict=True)):
         factor, shown = (1e3, "mm") if unit == "m" else (1e-3, "kPa")
         axis.plot(result.recorded_time, result.recorded[:, k] * factor, color="#999999", lw=1.8, label="recorded")
-        axis.plot(result.time, result.channels[:, k] * factor, color="#d62728", lw=0.8, label="closed loop, model")
+        axis.plot(result.time, result.channels[:, k] * factor, color="#d62728", lw=0.8, label=label)
         axis.set_ylabel(f"{name}\n({shown})")
         axis.grid(alpha=0.3)
         axis.margins(x=0)

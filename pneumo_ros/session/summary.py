@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
+from pneumo_ros.log.inspection import read_setups
 from pneumo_ros.log.reading import Joint, Log, read_log
 from pneumo_ros.ride.comfort import Ride, judge
 from pneumo_ros.rig import Rig
@@ -38,6 +40,8 @@ class Recorded:
     estimate_time, estimate : (M,), (M, 16) of /estimate/state
     truth_time, truth : (K,), (K, 16) of /sim/truth; empty on hardware
     road_time, road : (L,), (L, 2), m
+    measured_time, measured : (J,), (J, 6) displacements, m, and pressures, Pa, in the order of their topics
+    mode : lockstep, realtime, or empty where the log does not say
     """
 
     rig: Rig
@@ -49,6 +53,9 @@ class Recorded:
     truth: NDArray[np.float64]
     road_time: NDArray[np.float64]
     road: NDArray[np.float64]
+    measured_time: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    measured: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 6)))
+    mode: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,9 @@ class Summary:
     area_error : rms of estimated minus true effective area, front and rear, m2; None on hardware
     loop : node -> key -> text of its last /diagnostics
     speed : session time over wall time between first and last sample, 1 for real time; NaN if it was not logged
+    mode : as in :class:`Recorded`
+    judged_by : what the ride's figures come from: "truth" of a simulation, or "sensors"
+    warnings : what a reader of the figures must know, one line each
     """
 
     ride: Ride | None
@@ -69,6 +79,9 @@ class Summary:
     area_error: tuple[float, float] | None
     loop: dict[str, dict[str, str]]
     speed: float
+    mode: str = ""
+    judged_by: str = "truth"
+    warnings: tuple[str, ...] = ()
 
 
 def load_session(path: Path | str) -> Recorded:
@@ -91,16 +104,38 @@ def load_session(path: Path | str) -> Recorded:
         return np.asarray((joint.stamp_ns - start) * 1e-9, dtype=np.float64), joint.position
 
     return Recorded(log.config, *columns(topics.COMMAND), *columns(topics.ESTIMATE), *columns(topics.TRUTH),
-                    *columns(topics.ROAD))  # fmt: skip
+                    *columns(topics.ROAD), *_measured(log, start), mode=_mode(log))  # fmt: skip
 
 
-def summarise(session: Recorded, loop: dict[str, dict[str, str]] | None = None, wall: float = float("nan")) -> Summary:
+def _measured(log: Log, start: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Every displacement, with the pressures interpolated to its instants."""
+    pressures = (topics.FRONT_PRESSURE, topics.REAR_PRESSURE)
+    if not all(_has(log, topic) for topic in topics.MEASUREMENTS):
+        return np.empty(0), np.empty((0, 6))
+    joint = log.select(topics.DISPLACEMENT.name, list(topics.DISPLACEMENT.names))
+    found = [log.pressure(topic.name) for topic in pressures]
+    columns = [np.interp(joint.stamp_ns, one.stamp_ns, one.value) for one in found]
+    time = np.asarray((joint.stamp_ns - start) * 1e-9, dtype=np.float64)
+    return time, np.column_stack([joint.position, *columns])
+
+
+def _mode(log: Log) -> str:
+    return next((str(s.parameters["mode"]) for s in read_setups(log) if "mode" in s.parameters), "")
+
+
+def summarise(
+    session: Recorded,
+    loop: dict[str, dict[str, str]] | None = None,
+    wall: float = float("nan"),
+    warnings: Sequence[str] = (),
+) -> Summary:
     """Figures of a session; the first :data:`SETTLED` seconds are left out.
 
     Parameters
     ----------
     loop : of :func:`loop_timing`
     wall : of :func:`wall_time`, s
+    warnings : of :func:`pneumo_ros.session.warnings.warnings_of`
     """
     command = session.command[session.time >= SETTLED]
     top = session.rig.inlet_area_max.value
@@ -108,8 +143,23 @@ def summarise(session: Recorded, loop: dict[str, dict[str, str]] | None = None, 
         float(np.mean((column <= NEAR_LIMIT * top) | (column >= (1.0 - NEAR_LIMIT) * top))) if len(column) else 0.0
         for column in command[:, :2].T
     ]
-    return Summary(_ride(session), (saturated[0], saturated[1]), area_error(session), loop or {},
-                   float(session.time[-1]) / wall if len(session.time) else float("nan"))  # fmt: skip
+    by_truth = len(session.truth) > 1
+    return Summary(
+        _ride(session) if by_truth else _ride_of_sensors(session),
+        (saturated[0], saturated[1]),
+        area_error(session),
+        loop or {},
+        _last(session) / wall,
+        session.mode,
+        "truth" if by_truth else "sensors",
+        tuple(warnings),
+    )
+
+
+def _last(session: Recorded) -> float:
+    """Time of the last sample, s, with the period it stands for; NaN without any."""
+    times = session.measured_time if len(session.measured_time) > 1 else session.time
+    return float(times[-1] + np.median(np.diff(times))) if len(times) > 1 else float("nan")
 
 
 def area_error(session: Recorded) -> tuple[float, float] | None:
@@ -130,12 +180,50 @@ def ride_rows(ride: Ride) -> list[tuple[str, str, list[float], str]]:
     """(name, unit, values, format) of every figure of a ride, for tables."""
     return [
         ("heave accel., rms", "m/s2", [ride.heave_rms], "%.3f"),
-        ("same, full scale", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
+        (f"same, full scale (x {ride.scale:g})", "m/s2", [ride.full_scale_heave_rms], "%.3f"),
         ("pitch accel., rms", "rad/s2", [ride.pitch_rms], "%.3f"),
-        ("mean personal rating", "0-5", [ride.rating], "%.2f"),
+        ("mean personal rating", "0-5", [ride.rating if ride.rated else float("nan")], "%.2f"),
         ("tyre load variation, f / r", "%", [100.0 * v for v in ride.tyre_load_variation], "%.1f"),
         ("travel, f / r", "mm", [1e3 * v for v in ride.workspace], "%.1f"),
     ]
+
+
+# A quartic over 46 ms passes what a road excites (30 Hz) and leaves 10 um of LVDT noise as about 0.1 m/s2.
+ACCELERATION_WINDOW, ACCELERATION_ROWS = 0.046, 7  # s, samples at least
+REAL = 0.005  # a real-time session this close to 1 ran in real time
+
+
+def pace(summary: Summary) -> str:
+    """``, in real time (factor 1.00)`` and the like, with the reason where a real-time session's factor is not 1."""
+    if not np.isfinite(summary.speed):
+        return ""
+    if summary.mode != "realtime":
+        return f", at {summary.speed:.1f} x real time"
+    text = f", in real time (factor {summary.speed:.2f})"
+    if abs(summary.speed - 1.0) <= REAL:
+        return text
+    missed = any(int(values.get("missed periods", "0")) for values in summary.loop.values())
+    why = "periods were missed" if missed else "samples are missing at the start or end of the log"
+    return f"{text}: {why}"
+
+
+OUT_OF_RANGE = "out of its range"
+LARGE = 3.0  # ratio from which a factor says more than per cent
+
+
+def figures(values: Sequence[float], form: str) -> str:
+    """Front and rear, or one value; NaN is a regression that was left."""
+    return " / ".join(form % value if np.isfinite(value) else OUT_OF_RANGE for value in values)
+
+
+def change(ours: Sequence[float], theirs: Sequence[float]) -> str:
+    """Per cent from theirs to ours, or the factor where it is large; nothing where there is none."""
+    return " / ".join(_change(a, b) for a, b in zip(ours, theirs, strict=False) if b and np.isfinite(a / b))
+
+
+def _change(ours: float, theirs: float) -> str:
+    ratio = ours / theirs
+    return f"x {ratio:.3g}" if ratio > LARGE else f"{100.0 * (ratio - 1.0):+.0f} %"
 
 
 def static_tyre_loads(rig: Rig) -> tuple[float, float]:
@@ -157,8 +245,40 @@ def _ride(session: Recorded) -> Ride | None:
     heights = np.column_stack(spring_heights(x, rig.front_arm.value, rig.rear_arm.value))
     return judge(
         x[:, TRUE_HEAVE_ACCELERATION], x[:, TRUE_PITCH_ACCELERATION], x[:, TRUE_TYRE_FORCES],
-        static_tyre_loads(rig), heights,
+        static_tyre_loads(rig), heights, rig.length_scale.value,
     )  # fmt: skip
+
+
+def measured_tyre_forces(session: Recorded) -> NDArray[np.float64]:
+    """(J, 2) front and rear tyre force at the measured instants, N, by stiffness and the measured axles."""
+    rig, at = session.rig, session.measured_time
+    if not len(session.road):
+        return np.full((len(at), 2), np.nan)
+    road = np.column_stack([np.interp(at, session.road_time, session.road[:, side]) for side in (0, 1)])
+    stiffness = np.array([rig.tyre_stiffness_front.value, rig.tyre_stiffness_rear.value])
+    return np.asarray(stiffness * (road - session.measured[:, 2:4]))
+
+
+def _ride_of_sensors(session: Recorded) -> Ride | None:
+    """The same from what hardware has: the body's LVDTs twice differentiated, tyres and travel from the LVDTs."""
+    seen = session.measured_time >= SETTLED
+    if np.count_nonzero(seen) < 2 * ACCELERATION_ROWS:
+        return None
+    heights = session.measured[seen, :2] - session.measured[seen, 2:4]
+    heave, pitch = _body_accelerations(session, seen)
+    return judge(heave, pitch, measured_tyre_forces(session)[seen], static_tyre_loads(session.rig), heights,
+                 session.rig.length_scale.value)  # fmt: skip
+
+
+def _body_accelerations(session: Recorded, seen: NDArray[np.bool_]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Heave, m/s2, and pitch, rad/s2: looking both ways in time, which an estimator in the loop cannot."""
+    from scipy.signal import savgol_filter
+
+    period = float(np.median(np.diff(session.measured_time)))
+    rows = max(ACCELERATION_ROWS, round(ACCELERATION_WINDOW / period) // 2 * 2 + 1)
+    front, rear = savgol_filter(session.measured[seen, :2], rows, 4, deriv=2, delta=period, axis=0).T
+    a, b = session.rig.front_arm.value, session.rig.rear_arm.value
+    return (b * front + a * rear) / (a + b), (front - rear) / (a + b)
 
 
 def loop_timing(path: Path | str) -> dict[str, dict[str, str]]:

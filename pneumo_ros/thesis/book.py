@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import import_module
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from pneumo_ros.errors import InputError
-from pneumo_ros.thesis import beyond, chapter2, chapter3, chapter4, chapter5, chapter6
-from pneumo_ros.thesis.report import Chapter, Step
-from pneumo_ros.thesis.settings import ThesisSettings
+from pneumo_ros.errors import not_one_of
 
-CHAPTERS: dict[str, ModuleType] = {
-    "2": chapter2,
-    "3": chapter3,
-    "4": chapter4,
-    "5": chapter5,
-    "6": chapter6,
-    "beyond": beyond,
-}
+if TYPE_CHECKING:
+    from pneumo_ros.thesis.report import Chapter, Step
+    from pneumo_ros.thesis.settings import ThesisSettings
+
+CHAPTERS = {"2": "chapter2", "3": "chapter3", "4": "chapter4", "5": "chapter5", "6": "chapter6", "beyond": "beyond"}
+"""Name of a chapter -> its module, imported when it is built: together they take seconds."""
+
+
+def chapter(name: str) -> ModuleType:
+    """The module of a chapter."""
+    return import_module(f"pneumo_ros.thesis.{CHAPTERS[name]}")
 
 
 @dataclass(frozen=True)
@@ -30,11 +32,11 @@ class Book:
     @property
     def steps(self) -> int:
         """Experiments the chapters announce in all."""
-        return sum(int(CHAPTERS[name].STEPS) for name in self.names)
+        return sum(int(chapter(name).STEPS) for name in self.names)
 
     def build(self, settings: ThesisSettings, step: Step) -> list[Chapter]:
         """Compute them; ``step`` is called as each experiment begins."""
-        return [CHAPTERS[name].build(settings, step) for name in self.names]
+        return [chapter(name).build(settings, step) for name in self.names]
 
 
 def book(names: Iterable[str] = ()) -> Book:
@@ -48,5 +50,5 @@ def book(names: Iterable[str] = ()) -> Book:
     wanted = tuple(names) or tuple(CHAPTERS)
     for name in wanted:
         if name not in CHAPTERS:
-            raise InputError("no such chapter", where="thesis", key="chapter", value=name, allowed=", ".join(CHAPTERS))
+            raise not_one_of("no such chapter", name, CHAPTERS, where="thesis", key="chapter")
     return Book(wanted)

@@ -144,11 +144,23 @@ def test_a_bag_folder_reads(tmp_path: Path) -> None:
 
 
 def test_split_files_are_joined_in_the_listed_order(tmp_path: Path) -> None:
-    write(tmp_path / "b.mcap", [("/x", JOINT_STATE, t, joint(t, [t], ("a",))) for t in (1, 2)])
-    write(tmp_path / "a.mcap", [("/x", JOINT_STATE, t, joint(t, [t], ("a",))) for t in (3, 4)])
+    write(tmp_path / "bag_1.mcap", [("/x", JOINT_STATE, t, joint(t, [t], ("a",))) for t in (1, 2)])
+    write(tmp_path / "bag_0.mcap", [("/x", JOINT_STATE, t, joint(t, [t], ("a",))) for t in (3, 4)])
     assert read_log(tmp_path).joint("/x").position[:, 0].tolist() == [1, 2, 3, 4]
-    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {relative_file_paths: [b.mcap]}")
-    assert read_log(tmp_path).joint("/x").position[:, 0].tolist() == [1, 2]
+    listed = "rosbag2_bagfile_information: {relative_file_paths: [bag_1.mcap, bag_0.mcap]}"
+    (tmp_path / "metadata.yaml").write_text(listed)
+    assert read_log(tmp_path).joint("/x").position[:, 0].tolist() == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize("listed", ["", "rosbag2_bagfile_information: {relative_file_paths: [monday.mcap]}"])
+def test_a_folder_of_several_logs_asks_which(tmp_path: Path, listed: str) -> None:
+    for name in ("monday", "tuesday"):
+        write(tmp_path / f"{name}.mcap", [("/x", JOINT_STATE, t, joint(t, [t], ("a",))) for t in (1, 2)])
+    if listed:
+        (tmp_path / "metadata.yaml").write_text(listed)
+    with pytest.raises(InputError, match=r"several logs; allowed: monday.mcap, tuesday.mcap; say which, for example "):
+        read_log(tmp_path)
+    assert read_log(tmp_path / "tuesday.mcap").topics["/x"].count == 2
 
 
 def test_other_storages_of_ros2_bag(tmp_path: Path) -> None:

@@ -99,6 +99,7 @@ def test_a_session_on_hardware_is_logged_like_a_simulated_one(tmp_path: Path) ->
     for name in ("/road/profile", "/rig/front/pressure", "/rig/rear/pressure", "/rig/supply/pressure"):
         assert log.topics[name].count >= 4 * RATE - 60, name
     assert log.topics["/valve/command"].count > 2 * RATE
+    assert log.topics["/valve/applied"].count > 2 * RATE
     assert len(displacement.stamp_ns) >= 4 * RATE - 20 and len(raw.stamp_ns) >= 3900
     assert (np.diff(displacement.stamp_ns) > 0).all() and (np.diff(raw.stamp_ns) > 0).all()
     # Raw counts beside calibrated values: one follows from the other.
@@ -288,7 +289,7 @@ def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (("--port", "/nowhere"), "no such port"),
+        (("--port", "/nowhere", "--calibration", CALIBRATION), "no such port"),
         (("--port", "/dev/null", "--calibration", "nonsense"), "nonsense"),
         (("--port", "/dev/null", "--single-process"), "process of its own"),
         (("--source", "wireless"), "wireless"),
@@ -307,6 +308,7 @@ def test_bad_input_is_named(tmp_path: Path, options: tuple[str, ...], word: str)
 @pytest.mark.slow
 def test_a_port_that_is_none_ends_the_session_with_its_reason(tmp_path: Path) -> None:
     code, said = sessions.run(
-        "--source", "serial", "--output", str(tmp_path / "x.mcap"), "--port", "/dev/null", "--duration", "1"
-    )
+        "--source", "serial", "--output", str(tmp_path / "x.mcap"), "--port", "/dev/null", "--duration", "1",
+        "--calibration", CALIBRATION,
+    )  # fmt: skip
     assert code != 0 and "cannot open the port" in said and "Traceback" not in said

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pneumo_ros.daq.calibration import SENSORS
-from pneumo_ros.errors import InputError
+from pneumo_ros.errors import InputError, did_you_mean
 
 DEFAULTS: dict[str, dict[str, float | str]] = {
     "drop": {"rate": 1e-3},
@@ -84,10 +84,17 @@ def parse_fault(text: str) -> Fault:
     head, _, tail = text.partition(":")
     kind, _, when = head.partition("@")
     if kind not in DEFAULTS:
-        raise InputError("unknown fault", where="--fault", value=text, allowed=", ".join(DEFAULTS))
+        raise InputError("unknown fault", where="--fault", value=text, allowed=", ".join(DEFAULTS),
+                         remedy=did_you_mean(kind, DEFAULTS))  # fmt: skip
     start_text, _, span_text = when.partition("+")
     start = _seconds(start_text or "0", text)
+    if start < 0.0:
+        raise InputError("a fault cannot begin before the first arming", where="--fault", value=text,
+                         allowed="from 0 s", remedy="write for example stuck@5+2")  # fmt: skip
     span = _seconds(span_text, text) if span_text else PULSES.get(kind, math.inf)
+    if span <= 0.0:
+        raise InputError("a fault that lasts no time", where="--fault", value=text, allowed="more than 0 s",
+                         remedy="write for example stuck@5+2")  # fmt: skip
     options = dict(DEFAULTS[kind])
     for item in filter(None, tail.split(",")):
         key, _, raw = item.partition("=")

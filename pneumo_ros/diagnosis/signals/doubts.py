@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.signals.types import TopicData
+from pneumo_ros.diagnosis.signals.types import Limitation, TopicData
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
@@ -32,24 +32,40 @@ def check_road_unit(heights: Array, log: str) -> None:
         )  # fmt: skip
 
 
-def check_clocks(topics: Mapping[str, TopicData], log: str) -> None:
-    """Refuse a log in which one topic's stamps moved against the others' while it ran.
+def check_clocks(topics: Mapping[str, TopicData], log: str) -> list[Limitation]:
+    """Refuse a log in which one topic's stamps moved against the others' while it ran; say which only came late.
 
     The delay from stamp to log time is compared between the first and the last third of each topic, relative to the
-    middle of all topics, so that a recorder that stalls and a log that was written slowly do no harm.
+    middle of all topics, so that a recorder that stalls and a log that was written slowly do no harm. Where the stamps
+    go on in even steps and it is the arrival that jumped, the messages were delayed on their way: their time is right.
     """
     moved = {topic: _delay_change(data) for topic, data in topics.items() if _judged(data)}
     if len(moved) < PIECES:
-        return
+        return []
     common = float(np.median(list(moved.values())))
     late = {topic: change - common for topic, change in moved.items() if abs(change - common) > CLOCK_STEP}
-    if late:
-        worst = max(late, key=lambda topic: abs(late[topic]))
+    moved_clock = {topic: change for topic, change in late.items() if not _came_late(topics[topic])}
+    if moved_clock:
+        worst = max(moved_clock, key=lambda topic: abs(moved_clock[topic]))
         raise InputError(
             "the clock of some topics was set while the log ran, so the topics share no time base",
-            where=f"{log}, {', '.join(sorted(late))}", value=f"{-late[worst]:.3g} s",
+            where=f"{log}, {', '.join(sorted(moved_clock))}", value=f"{-moved_clock[worst]:.3g} s",
             remedy="cut the log before the jump, or record it again",
         )  # fmt: skip
+    return [
+        Limitation("delayed", f"{topic} arrived {abs(change):.3g} s {'later' if change > 0.0 else 'earlier'} towards "
+                              "the end; its stamps are even, so they are used as they are.")
+        for topic, change in late.items()
+    ]  # fmt: skip
+
+
+def _came_late(data: TopicData) -> bool:
+    """Whether the delay changed by jumps of the arrival while the stamps went on evenly."""
+    assert data.received is not None
+    steps, arrivals = np.diff(data.stamp), np.diff(data.received)
+    jumps = arrivals - steps
+    at_arrival = (np.abs(jumps) > CLOCK_STEP / 5) & (np.abs(steps - np.median(steps)) < 0.5 * np.abs(jumps))
+    return bool(abs(jumps[at_arrival].sum()) > 0.5 * abs(_delay_change(data)))
 
 
 def _judged(data: TopicData) -> bool:

@@ -41,7 +41,9 @@ class Checked(NamedTuple):
     limitations: list[Limitation]
 
 
-def check_channel(name: str, values: Array, weight: Array, stated_noise: float, log: str = "log") -> Checked:
+def check_channel(
+    name: str, values: Array, weight: Array, stated_noise: float, log: str = "log", drive: Array | None = None
+) -> Checked:
     """Look at one channel of :data:`MEASURED` on the uniform base.
 
     Parameters
@@ -49,6 +51,7 @@ def check_channel(name: str, values: Array, weight: Array, stated_noise: float, 
     values, weight : (N,)
     stated_noise : the config's standard deviation, 0 if it states none
     log : its name, for messages
+    drive : (N, k) held inputs that enter the channel's rate, for :func:`white_noise`
 
     Raises
     ------
@@ -64,7 +67,7 @@ def check_channel(name: str, values: Array, weight: Array, stated_noise: float, 
     kept = _without_stuck(name, values, weight, found)
     if kept.sum() < MOSTLY * weight.sum():
         return Checked(np.zeros_like(weight), stated_noise, [*found, _left_out(name, "mostly_stuck", "mostly stands")])
-    weight, noise = kept, white_noise(values, kept)
+    weight, noise = kept, white_noise(values, kept, drive)
     noise = noise if np.isfinite(noise) and noise > 0.0 else stated_noise
     weight = _without_glitches(name, values, weight, noise, found)
     if weight.mean() < MOSTLY and not _merely_slow(weight):

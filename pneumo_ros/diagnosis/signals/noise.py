@@ -2,31 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
+
 ORDERS = (2, 3, 4, 5, 6)
 MIN_SAMPLES = 20
+# A chattering command writes a random walk into the pressure, which no difference takes away: of a walk's step s, s / 2
+# stays. Its gain moves with pressure and height, so it is taken out window by window: 0.2 s at 500 Hz, in which the
+# body moves little, and 100 rows for a handful of gains.
+WINDOW = 100  # rows
+LONGEST_DELAY = 25  # rows within which a command's onset is looked for
+ONSET = (0, 1)  # rows after the delay: a delay that is no whole number of samples spreads an onset over two
+ONSET_ORDER = 4
+WORTH = 0.9  # the least of many estimates lies low by itself: a drive that explains less than this is left alone
 
 
-def white_noise(values: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+def white_noise(
+    values: NDArray[np.float64], weight: NDArray[np.float64], drive: NDArray[np.float64] | None = None
+) -> float:
     """Standard deviation of the white noise in a channel; NaN with too few samples.
 
     Parameters
     ----------
     values, weight : (N,) uniform samples; differences touching a filled sample are left out
+    drive : (N, k) held inputs that enter the channel's rate, row i from sample i to i + 1; None where there are none
 
-    Differencing m times takes a smooth signal away and multiplies white noise by sqrt(C(2m, m)). Each order gives an
-    upper bound (what is left of the signal adds to it), so the smallest is taken; the median is deaf to shocks.
-    Half a quantisation step is the floor, uniform over a step: q / sqrt(12).
+    Differencing m times takes a smooth signal away and multiplies white noise by sqrt(C(2m, m)). What a drive steps
+    from sample to sample is regressed out, its delay found first. Each order gives an upper bound (what is left of the
+    signal adds to it), so the smallest is taken; the median is deaf to shocks. Half a quantisation step is the floor,
+    uniform over a step: q / sqrt(12).
     """
-    estimates = [_from_differences(values, weight, order) for order in ORDERS]
-    finite = [estimate for estimate in estimates if np.isfinite(estimate)]
-    if not finite:
-        return float("nan")
-    return max(min(finite), quantum(values[weight > 0]) / np.sqrt(12.0))
+    columns = _moving(drive)
+    found = _least(_from_differences(values, weight, order) for order in ORDERS)
+    if columns is not None and np.isfinite(found):
+        delay = _delay(values, weight, columns)
+        beside = _least(_beside_drive(values, weight, columns, delay, order) for order in ORDERS)
+        found = beside if beside < WORTH * found else found
+    return max(found, quantum(values[weight > 0]) / np.sqrt(12.0)) if np.isfinite(found) else found
+
+
+def _least(estimates: Iterable[float]) -> float:
+    return min((estimate for estimate in estimates if np.isfinite(estimate)), default=float("nan"))
 
 
 def quantum(values: NDArray[np.float64]) -> float:
@@ -37,9 +58,61 @@ def quantum(values: NDArray[np.float64]) -> float:
     return float(np.diff(distinct).min())
 
 
-def _from_differences(values: NDArray[np.float64], weight: NDArray[np.float64], order: int) -> float:
-    whole = np.convolve(weight, np.ones(order + 1), mode="valid") > order + 0.5
+def _whole(weight: Array, order: int) -> NDArray[np.bool_]:
+    """Differences that touch no filled sample."""
+    return np.asarray(np.convolve(weight, np.ones(order + 1), mode="valid") > order + 0.5)
+
+
+def _spread(rest: Array, order: int) -> float:
+    return float(np.median(np.abs(rest)) / 0.6745 / np.sqrt(comb(2 * order, order)))
+
+
+def _from_differences(values: Array, weight: Array, order: int) -> float:
+    whole = _whole(weight, order)
     if np.count_nonzero(whole) < MIN_SAMPLES:
         return float("nan")
-    rest = np.diff(values, n=order)[whole]
-    return float(np.median(np.abs(rest)) / 0.6745 / np.sqrt(comb(2 * order, order)))
+    return _spread(np.diff(values, n=order)[whole], order)
+
+
+def _moving(drive: Array | None) -> Array | None:
+    """Columns that change, each to a standard deviation of 1."""
+    if drive is None:
+        return None
+    std = drive.std(axis=0)
+    moving = std > 1e-6 * np.abs(drive).max(axis=0)
+    return drive[:, moving] / std[moving] if moving.any() else None
+
+
+def _delay(values: Array, weight: Array, drive: Array) -> int:
+    """Rows from a command to its onset in the channel: where their differences agree best."""
+    whole = _whole(weight, ONSET_ORDER)
+    rest = np.where(whole, np.diff(values, n=ONSET_ORDER), 0.0)
+    steps = np.diff(drive, n=ONSET_ORDER - 1, axis=0)[:-1]
+    longest = min(LONGEST_DELAY, len(rest) // 2)
+    agreement = [np.abs(rest[late:] @ steps[: len(rest) - late]).max() for late in range(longest)]
+    return int(np.argmax(agreement)) if agreement else 0
+
+
+def _beside_drive(values: Array, weight: Array, drive: Array, delay: int, order: int) -> float:
+    """As :func:`_from_differences`, of what the drive does not explain in each window."""
+    rest, whole = np.diff(values, n=order), _whole(weight, order)
+    steps = np.diff(drive, n=order - 1, axis=0)[: len(rest)]
+    late = [delay + onset for onset in ONSET]
+    first = max(late)
+    causes = np.column_stack([steps[first - k : len(steps) - k] for k in late])
+    rest, whole = rest[first:], whole[first:]
+    kept = [
+        _unexplained(rest[start : start + WINDOW], causes[start : start + WINDOW], whole[start : start + WINDOW])
+        for start in range(0, len(rest) - WINDOW + 1, WINDOW)
+    ]
+    pooled = np.concatenate(kept) if kept else np.empty(0)
+    return _spread(pooled, order) if len(pooled) >= MIN_SAMPLES else float("nan")
+
+
+def _unexplained(rest: Array, causes: Array, whole: NDArray[np.bool_]) -> Array:
+    """Residuals of the window's own gains, scaled up by the freedom those took."""
+    rows = int(np.count_nonzero(whole))
+    if rows < max(MIN_SAMPLES, 4 * causes.shape[1]):
+        return np.empty(0)
+    gains, _, rank, _ = np.linalg.lstsq(causes[whole], rest[whole], rcond=1e-8)
+    return np.asarray((rest[whole] - causes[whole] @ gains) * np.sqrt(rows / (rows - rank)))

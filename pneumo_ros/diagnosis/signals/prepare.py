@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.signals.doubts import check_clocks, check_gauge, check_road_unit
 from pneumo_ros.diagnosis.signals.health import all_limits, check_channel, missing
 from pneumo_ros.diagnosis.signals.initial import estimate_initial
+from pneumo_ros.diagnosis.signals.interruptions import LoggedEvent, as_applied, as_commanded, stretches_unknown
 from pneumo_ros.diagnosis.signals.timebase import (
     drivable_span,
     held,
@@ -25,15 +26,23 @@ from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
 
 ROAD, VALVE, DISPLACEMENT = "/road/profile", "/valve/command", "/rig/displacement"
+APPLIED = "/valve/applied"  # what hardware made of the command
 PRESSURE = {"front_pressure": "/rig/front/pressure", "rear_pressure": "/rig/rear/pressure"}
 TOPIC_OF = {name: PRESSURE.get(name, DISPLACEMENT) for name in MEASURED}
+VALVES_OF = {"front_pressure": [0, 2], "rear_pressure": [1, 3]}  # columns of COMMANDS that fill and empty it
 MIN_DURATION = 2.0  # s: about four periods of the body
 SHORT_DURATION = 6.0  # s
 SLOWEST = 0.05  # s between samples of the fastest measured topic
 SLOW = 0.02  # s: fewer than 5 samples a period of wheel hop
 
 
-def prepare(topics: Mapping[str, TopicData], rig: Rig, name: str = "log", origin: float = 0.0) -> Signals:
+def prepare(
+    topics: Mapping[str, TopicData],
+    rig: Rig,
+    name: str = "log",
+    origin: float = 0.0,
+    events: Sequence[LoggedEvent] = (),
+) -> Signals:
     """Bring the topics of one log onto one uniform time base.
 
     Parameters
@@ -42,8 +51,10 @@ def prepare(topics: Mapping[str, TopicData], rig: Rig, name: str = "log", origin
     rig : the rig the log was made on
     name : of the log, for messages
     origin : s since the epoch that the stamps count from (float64 stamps since the epoch are coarse to 0.2 us)
+    events : of the log; they tell where hardware held the valves safe, if the openings were not logged
 
-    The base has the rate of the fastest measured topic and starts at that topic's first sample.
+    The openings that were applied (``/valve/applied``) take the command's place where they are logged. The base has the
+    rate of the fastest measured topic and starts at that topic's first sample.
 
     Raises
     ------
@@ -53,10 +64,10 @@ def prepare(topics: Mapping[str, TopicData], rig: Rig, name: str = "log", origin
     """
     limits: list[Limitation] = []
     clean = _one_clock(topics, name, limits)
-    grid, period = _grid(clean, name, limits)
+    grid, period = _grid(clean, name, limits, events)
     commands, road = _inputs(clean, grid, period, rig, name, limits)
     check_road_unit(road, name)
-    measured, weight, noise, stated = _measured(clean, grid, period, rig, name, limits)
+    measured, weight, noise, stated = _measured(clean, grid, commands, rig, name, limits)
     check_gauge(*_middles(measured, weight), rig, name)
     limits += all_limits(weight, measured, noise)
     return Signals(
@@ -98,7 +109,7 @@ def _one_clock(topics: Mapping[str, TopicData], name: str, limits: list[Limitati
         pieces = {topic: [p[best]] for topic, p in pieces.items()}
         text = "The clock was set back during the log; only the longest piece between jumps is used."
         limits.append(Limitation("clock_jump", text, (), 0.9))
-    check_clocks({topic: p[0] for topic, p in pieces.items()}, name)
+    limits += check_clocks({topic: p[0] for topic, p in pieces.items()}, name)
     ordered = {topic: in_order(p[0]) for topic, p in pieces.items()}
     for topic, (_, reordered, repeated) in ordered.items():
         if reordered or repeated:
@@ -112,7 +123,9 @@ def _longest(pieces: Mapping[str, list[TopicData]]) -> int:
     return int(np.argmax(spans.min(axis=0)))
 
 
-def _grid(topics: Mapping[str, TopicData], name: str, limits: list[Limitation]) -> tuple[Array, float]:
+def _grid(
+    topics: Mapping[str, TopicData], name: str, limits: list[Limitation], events: Sequence[LoggedEvent]
+) -> tuple[Array, float]:
     needed = _required(topics, name)
     measured = {t: topics[t] for t in (DISPLACEMENT, *PRESSURE.values()) if t in topics}
     if not measured:
@@ -122,7 +135,11 @@ def _grid(topics: Mapping[str, TopicData], name: str, limits: list[Limitation]) 
         )  # fmt: skip
     periods = {topic: float(np.median(np.diff(data.stamp))) for topic, data in measured.items()}
     fastest = min(periods, key=lambda topic: periods[topic])
-    start, end = drivable_span([data.stamp for data in needed], name)
+    safe = [] if APPLIED in topics else stretches_unknown(events, float(needed[1].stamp[-1]))
+    start, end = drivable_span([data.stamp for data in needed], name, safe)
+    if APPLIED not in topics:
+        inside = [(max(a, needed[0].stamp[0]), min(b, needed[0].stamp[-1])) for a, b in safe]
+        limits += as_commanded(events, float(sum(max(b - a, 0.0) for a, b in inside)))
     base = measured[fastest].stamp
     whole = max(end, base[-1]) - min(start, base[0])
     start, end = max(start, base[0]), min(end, base[-1])
@@ -199,12 +216,26 @@ def _inputs(
             text = f"{channel} is not in {VALVE}: the config's constant {constant.value:.3g} m2 is used."
             limits.append(Limitation("assumed_outlet", text, (), 0.95))
     commands = np.column_stack(areas)
+    if APPLIED in topics:
+        commands = _as_applied(topics[APPLIED], commands, grid, period, limits)
     if commands.min() < 0.0 or commands.max() > 1e-3:
         raise InputError(
             "orifice area not in m2", where=f"{name}, {VALVE}", value=float(commands.max()),
             allowed="0 to 0.001 m2", remedy="convert the log",
         )  # fmt: skip
     return commands, np.column_stack(heights)
+
+
+def _as_applied(data: TopicData, commands: Array, grid: Array, period: float, limits: list[Limitation]) -> Array:
+    """The openings that reached the valves, (N, 4); the command for a valve that the topic does not name."""
+    applied = commands.copy()
+    for column, channel in enumerate(COMMANDS):
+        values = data.channels.get(channel)
+        if values is not None and np.count_nonzero(np.isfinite(values)) >= 2:
+            applied[:, column] = held(data.stamp, values, grid, period)
+    said = as_applied(applied, commands)
+    limits += [said] if said is not None else []
+    return applied
 
 
 def _linear(stamp: Array, values: Array, grid: Array) -> Array:
@@ -231,8 +262,9 @@ def _middles(measured: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def _measured(
-    topics: Mapping[str, TopicData], grid: Array, period: float, rig: Rig, log: str, limits: list[Limitation]
+    topics: Mapping[str, TopicData], grid: Array, commands: Array, rig: Rig, log: str, limits: list[Limitation]
 ) -> tuple[Array, Array, Array, Array]:
+    period = float(grid[1] - grid[0])
     values, weights, noises, stated = [], [], [], []
     for channel in MEASURED:
         expected = rig.pressure_noise.value if channel in PRESSURE else rig.displacement_noise.value
@@ -243,7 +275,8 @@ def _measured(
         if data is not None and raw is not None and np.isfinite(raw).any():
             _count_nan(TOPIC_OF[channel], replace_name(data, key, channel), (channel,), limits)
             column, weight = sampled(data.stamp, raw, grid, period)
-        checked = check_channel(channel, column, weight, expected, log)
+        valves = commands[:, VALVES_OF[channel]] if channel in VALVES_OF else None
+        checked = check_channel(channel, column, weight, expected, log, valves)
         limits += checked.limitations if weight.any() else [missing(channel, _why_missing(channel, data, raw))]
         values.append(column)
         weights.append(checked.weight)

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.diagnosis.signals.prepare import DISPLACEMENT, PRESSURE, ROAD, VALVE, prepare
+from pneumo_ros.diagnosis.signals.interruptions import LoggedEvent
+from pneumo_ros.diagnosis.signals.prepare import APPLIED, DISPLACEMENT, PRESSURE, ROAD, VALVE, prepare
 from pneumo_ros.diagnosis.signals.types import Signals, TopicData
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.inspection import read_events
 from pneumo_ros.log.reading import CONFIG_TOPIC, Log, read_log
+from pneumo_ros.log.topics import EVENTS
 from pneumo_ros.rig import Rig, parse_rig
 
 
@@ -22,11 +25,11 @@ def read_signals(path: str | Path, rig: Rig | None = None) -> Signals:
     InputError
         if the file is not a readable log, or cannot be diagnosed at all (one line: what, where, remedy).
     """
-    wanted = (ROAD, VALVE, DISPLACEMENT, *PRESSURE.values(), CONFIG_TOPIC)
+    wanted = (ROAD, VALVE, APPLIED, DISPLACEMENT, *PRESSURE.values(), CONFIG_TOPIC, EVENTS.name)
     log = read_log(path, wanted)
     own = rig or own_rig(log)
     topics, origin = topics_of(log)
-    return prepare(topics, own, Path(path).name, origin)
+    return prepare(topics, own, Path(path).name, origin, events_of(log, origin))
 
 
 def own_rig(log: Log) -> Rig:
@@ -51,7 +54,7 @@ def own_rig(log: Log) -> Rig:
 
 def topics_of(log: Log) -> tuple[dict[str, TopicData], float]:
     """The diagnosis's topics of a log, stamps in s from the returned origin (s since the epoch)."""
-    joints = [topic for topic in (ROAD, VALVE, DISPLACEMENT) if _holds(log, topic)]
+    joints = [topic for topic in (ROAD, VALVE, APPLIED, DISPLACEMENT) if _holds(log, topic)]
     scalars = [topic for topic in PRESSURE.values() if _holds(log, topic)]
     raw: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], dict[str, NDArray[np.float64]]]] = {}
     for topic in joints:
@@ -67,6 +70,11 @@ def topics_of(log: Log) -> tuple[dict[str, TopicData], float]:
         for topic, (stamp, received, columns) in raw.items()
     }
     return topics, origin * 1e-9
+
+
+def events_of(log: Log, origin: float) -> list[LoggedEvent]:
+    """The log's events, with times in s from ``origin`` (s since the epoch)."""
+    return [LoggedEvent(e.stamp_ns * 1e-9 - origin, e.level, e.source, e.code) for e in read_events(log)]
 
 
 def _seconds(stamp_ns: NDArray[np.int64], origin_ns: int) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -114,8 +115,8 @@ def held(stamp: Array, values: Array, grid: Array, period: float) -> Array:
     return np.diff(np.interp(edges, ends, total)) / period
 
 
-def drivable_span(stamps: list[Array], origin: str) -> tuple[float, float]:
-    """Longest span in which every one of these topics has no gap longer than ``INPUT_GAP``, s.
+def drivable_span(stamps: list[Array], origin: str, holes: Sequence[tuple[float, float]] = ()) -> tuple[float, float]:
+    """Longest span outside ``holes`` in which every one of these topics has no gap longer than ``INPUT_GAP``, s.
 
     Raises
     ------
@@ -125,7 +126,8 @@ def drivable_span(stamps: list[Array], origin: str) -> tuple[float, float]:
     start, end = max(s[0] for s in stamps), min(s[-1] for s in stamps)
     if end <= start:
         raise InputError("the topics do not overlap in time", where=origin, remedy="check the clocks of their writers")
-    gaps = sorted(gap for s in stamps for gap in _gaps(s) if gap[1] > start and gap[0] < end)
+    all_gaps = [*holes, *(gap for s in stamps for gap in _gaps(s))]
+    gaps = sorted(gap for gap in all_gaps if gap[1] > start and gap[0] < end)
     spans, left = [], start
     for begin, finish in gaps:
         spans.append((left, begin))

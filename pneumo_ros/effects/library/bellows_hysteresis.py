@@ -11,6 +11,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -49,4 +50,19 @@ EFFECT = Effect(
         EffectParameter("unloading", "1", -0.3, 1.3, 0.5),
     ),
     term=PlantTerm(states=1, advance=advance, force=force),
+    guide=Guide(
+        meaning=(
+            "The rubber of the bellows loses energy by travel, not by speed: the force lags behind the height, at"
+            " any speed."
+        ),
+        check=(
+            "close both valves, move the body slowly over some mm and back with a spring balance: the force opens"
+            " a loop of {hysteresis_force} half width that does not shrink with slower motion and is gone with "
+            "the bellows off"
+        ),
+        mistaken_for={
+            "coulomb_friction": "stays with the bellows off, and its loop has square corners",
+            "heat_transfer": "its loop shrinks when the motion becomes very slow",
+        },
+    ),
 )

@@ -13,6 +13,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -60,4 +61,12 @@ EFFECT = Effect(
         EffectParameter("wall_share", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0)),
     ),
     term=PlantTerm(states=2, start=start, advance=advance, force=force),
+    guide=Guide(
+        meaning="The bellows' own mass swings inside the strut: force and motion have a narrow resonance.",
+        check=(
+            "tap the bellows with the rig at rest and the LVDTs logged: a ring of about {mode_frequency} that "
+            "dies within some periods; a clamp on the bellows moves it"
+        ),
+        mistaken_for={"tyre_damping": "changes wheel hop's height but rings at no frequency of its own"},
+    ),
 )

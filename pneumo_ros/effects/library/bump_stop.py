@@ -9,6 +9,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT
@@ -35,4 +36,12 @@ EFFECT = Effect(
         EffectParameter("stop_damping", "s/m", 0.0, 2.0, 0.2),
     ),
     term=PlantTerm(force=force),
+    guide=Guide(
+        meaning="The bump stop is touched earlier, or is harder, than modelled.",
+        check=(
+            "push the body down slowly with a ruler at the strut: contact comes {stop_lead} before the stop of "
+            "the rig file, and from there on the force rises by {stop_stiffness}"
+        ),
+        mistaken_for={"effective_area_error": "acts at all heights, a stop only below one"},
+    ),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -19,4 +20,9 @@ EFFECT = Effect(
     places=("body_pitch", "body_heave"),
     parameters=(EffectParameter("cg_shift_forward", "m", -0.12, 0.12, 0.008, size=True, starts=(-0.008,)),),
     plant=plant,
+    guide=Guide(
+        meaning="The centre of mass is not where the rig file says.",
+        check="weigh front and rear axle: their ratio puts the centre {cg_shift_forward} further forward",
+        mistaken_for={"payload": "changes the sum of both scales"},
+    ),
 )

@@ -13,6 +13,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -56,4 +57,19 @@ EFFECT = Effect(
         EffectParameter("stribeck_excess", "1", 0.0, 1.0, 0.25),
     ),
     term=PlantTerm(states=1, advance=advance, force=force),
+    guide=Guide(
+        meaning=(
+            "A bushing or guide drags: the strut sticks until the force beyond balance exceeds the friction, then"
+            " slides. Small roads hardly move it."
+        ),
+        check=(
+            "vent and disconnect the bellows, push the body slowly up and down over one axle with a spring "
+            "balance: the force differs by twice {friction_force} between up and down, whatever the speed; "
+            "released, it stays where it is"
+        ),
+        mistaken_for={
+            "viscous_damping": "grows with speed; friction is the same at half the speed",
+            "bellows_hysteresis": "goes away with the bellows disconnected; friction stays",
+        },
+    ),
 )

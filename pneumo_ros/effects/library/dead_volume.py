@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Plant, Values, with_gas
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -18,4 +19,14 @@ EFFECT = Effect(
     places=("{end}_air",),
     parameters=(EffectParameter("dead_volume", "m3", -2e-5, 3e-4, 1e-5, size=True),),
     plant=plant,
+    guide=Guide(
+        meaning="Hoses and fittings hold air beside the spring: it is softer and fills more slowly.",
+        check=(
+            "measure hose length and bore, or disconnect the hose at the spring and fill it with water: {dead_volume}"
+        ),
+        mistaken_for={
+            "heat_transfer": "softens slow strokes only",
+            "orifice_coefficient": "leaves the stiffness with closed valves alone",
+        },
+    ),
 )

@@ -6,6 +6,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.units import INCH
@@ -30,4 +31,15 @@ EFFECT = Effect(
         EffectParameter("area_slope_error", "1", -1.5, 1.5, 0.1, size=True, starts=(-0.1,)),
     ),
     term=PlantTerm(force=force),
+    guide=Guide(
+        meaning="The bellows' effective area is not the table's: by a factor, or leaning over height.",
+        check=(
+            "level the rig, read both gauges, weigh each axle: load over gauge pressure differs from the table by"
+            " {area_error}; repeat 5 mm higher and lower for the slope"
+        ),
+        mistaken_for={
+            "payload": "changes front and rear by the load's place, not by the spring",
+            "pressure_scale": "compare the gauge with a second one first",
+        },
+    ),
 )

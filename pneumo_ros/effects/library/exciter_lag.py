@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.effects.filters import lagged_line
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 
@@ -26,4 +27,9 @@ EFFECT = Effect(
     ),
     derived=(Derived("exciter_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,
+    guide=Guide(
+        meaning="The road exciter follows its command late and rounds its corners.",
+        check="put an LVDT or dial gauge on the exciter's table and play a step: it arrives {exciter_lag} late",
+        mistaken_for={"tyre_damping": "leaves the exciter's own position right"},
+    ),
 )

@@ -10,6 +10,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.units import GAS_CONSTANT
@@ -44,4 +45,15 @@ EFFECT = Effect(
     places=("{end}_air",),
     parameters=(EffectParameter("wall_conductance", "W/K", 0.0, 20.0, 0.2, size=True, starts=(1.0,)),),
     term=PlantTerm(states=1, start=start, advance=advance, air=air),
+    guide=Guide(
+        meaning="The air gives heat to the bellows' wall: slow strokes are nearly isothermal, fast ones adiabatic.",
+        check=(
+            "close the valves, press the body down by 10 mm quickly and hold: the pressure jumps, then falls back"
+            " by some kPa within a second or so although nothing leaks"
+        ),
+        mistaken_for={
+            "leak": "the pressure does not come back when the body is let go",
+            "bellows_hysteresis": "shows in the force, not in the pressure",
+        },
+    ),
 )

@@ -13,6 +13,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT
@@ -43,4 +44,15 @@ EFFECT = Effect(
         EffectParameter("leak_law", "1", 0.0, 1.2, 0.6),
     ),
     term=PlantTerm(air=air),
+    guide=Guide(
+        meaning="The spring, a fitting or the closed outlet lets air out.",
+        check=(
+            "close all valves at design height, wait 60 s, watch the pressure fall while the height sinks; soap "
+            "water shows the place. As a hole it has {leak_area}"
+        ),
+        mistaken_for={
+            "supply_droop": "happens only while air is drawn",
+            "orifice_coefficient": "acts only through open valves",
+        },
+    ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import Effect, Memory, Values
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
@@ -30,4 +31,12 @@ EFFECT = Effect(
     parameters=(EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),),
     outputs=outputs,
     undo=undo,
+    guide=Guide(
+        meaning="An LVDT's sensitivity is off.",
+        check=(
+            "put a gauge block of 10 mm under the core: the reading is off by {scale_error}; pneumo calibrate "
+            "fits a new line"
+        ),
+        mistaken_for={"lvdt_offset": "is the same at every height"},
+    ),
 )

@@ -11,6 +11,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT
@@ -40,4 +41,15 @@ EFFECT = Effect(
         EffectParameter("outlet_share", "1", -0.2, 1.2, 0.5, starts=(0.0,)),
     ),
     term=PlantTerm(air=air),
+    guide=Guide(
+        meaning="Inlet and outlet pass more or less air than their opening says: another discharge coefficient.",
+        check=(
+            "hold one inlet open by a known command with the outlet closed and time the fill from 1.5 to 3 bar: "
+            "the time is off by {coefficient_error}"
+        ),
+        mistaken_for={
+            "leak": "empties the spring with all valves closed",
+            "dead_volume": "makes filling and emptying slow by the same factor, with the valves' flow unchanged",
+        },
+    ),
 )

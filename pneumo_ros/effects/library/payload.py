@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -18,4 +19,12 @@ EFFECT = Effect(
     places=("body_heave", "body_pitch"),
     parameters=(EffectParameter("payload", "kg", -15.0, 40.0, 2.0, size=True, starts=(-2.0,)),),
     plant=plant,
+    guide=Guide(
+        meaning="More (or less) lies on the body than the rig file says.",
+        check="weigh front and rear axle on two scales: their sum is off by {payload}",
+        mistaken_for={
+            "effective_area_error": "leaves the scales right and the gauge pressures wrong",
+            "cg_shift": "keeps the sum",
+        },
+    ),
 )

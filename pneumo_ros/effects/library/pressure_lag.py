@@ -8,6 +8,7 @@ from __future__ import annotations
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values, by_column
 from pneumo_ros.effects.filters import lagged_line
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 
@@ -29,4 +30,12 @@ EFFECT = Effect(
     ),
     derived=(Derived("sensor_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     outputs=outputs,
+    guide=Guide(
+        meaning="A pressure sensor reports late: a long thin gauge line, or a filter.",
+        check=(
+            "open the spring to the atmosphere at one stroke: the sensor follows with {sensor_lag}, the body "
+            "falls at once; a shorter line cures it"
+        ),
+        mistaken_for={"valve_lag": "the body is late as well"},
+    ),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.sensors import shifted, unshifted
 
@@ -14,4 +15,12 @@ EFFECT = Effect(
     parameters=(EffectParameter("offset", "Pa", -6e4, 6e4, 2e3, size=True),),
     outputs=shifted,
     undo=unshifted,
+    guide=Guide(
+        meaning="A pressure sensor's zero is off.",
+        check="vent the spring: the sensor says {offset} more (less) than the barometer",
+        mistaken_for={
+            "pressure_scale": "vented, the sensor is right",
+            "payload": "the scales under the axles agree with the rig file",
+        },
+    ),
 )

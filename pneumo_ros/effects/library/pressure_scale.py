@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.units import ATMOSPHERE
 
@@ -35,4 +36,15 @@ EFFECT = Effect(
     ),
     outputs=outputs,
     undo=undo,
+    guide=Guide(
+        meaning="A pressure sensor's sensitivity is off.",
+        check=(
+            "put a reference gauge beside it at 1, 3 and 5 bar: the reading is off by {scale_error} of what is "
+            "above {pivot_pressure}"
+        ),
+        mistaken_for={
+            "effective_area_error": "the reference gauge agrees with the sensor",
+            "pressure_offset": "is the same at every pressure",
+        },
+    ),
 )

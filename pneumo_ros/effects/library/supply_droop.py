@@ -11,6 +11,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import RIG, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -49,4 +50,12 @@ EFFECT = Effect(
         EffectParameter("supply_time_constant", "s", 0.002, 20.0, 0.3, starts=(0.03, 3.0)),
     ),
     term=PlantTerm(states=1, start=start, advance=advance, supply=supply, shared=True),
+    guide=Guide(
+        meaning="The supply's pressure falls while air is drawn: small tank, tired regulator, long hose.",
+        check=(
+            "put a gauge at the manifold, open both inlets for 1 s: the pressure sags by {supply_resistance} of "
+            "flow and is back after about {supply_time_constant}"
+        ),
+        mistaken_for={"orifice_coefficient": "is there with small draws as well; droop grows with what both ends draw"},
+    ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.effects.filters import delayed_hold
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -23,4 +24,9 @@ EFFECT = Effect(
     places=("{end}_air",),
     parameters=(EffectParameter("delay", "s", 0.0, 0.2, 0.012, size=True, starts=(0.04,)),),
     inputs=inputs,
+    guide=Guide(
+        meaning="The command acts late by a pure delay: bus, driver, valve electronics.",
+        check="step one inlet open at rest: for {delay} nothing happens, then the pressure rises at its full rate",
+        mistaken_for={"valve_lag": "begins at once but slowly", "exciter_lag": "concerns the road, not the valves"},
+    ),
 )

@@ -6,6 +6,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -23,4 +24,15 @@ EFFECT = Effect(
     places=("{end}_tyre",),
     parameters=(EffectParameter("tyre_damping", "N s/m", 0.0, 500.0, 20.0, size=True),),
     term=PlantTerm(tyre=tyre),
+    guide=Guide(
+        meaning="The tyre takes energy by itself.",
+        check=(
+            "fix the body, push the axle down on the tyre and let go: the hop dies within a few swings; "
+            "{tyre_damping} between axle and ground"
+        ),
+        mistaken_for={
+            "viscous_damping": "is gone when the body moves with the axle",
+            "exciter_lag": "smooths the road under a stiff tyre too",
+        },
+    ),
 )

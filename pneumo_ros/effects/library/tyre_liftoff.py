@@ -6,6 +6,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Tyre
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -23,4 +24,12 @@ EFFECT = Effect(
     places=("{end}_tyre",),
     parameters=(EffectParameter("lost_pull", "1", 0.0, 1.0, 0.9, size=True, ends=(0.0, 1.0)),),
     term=PlantTerm(tyre=tyre),
+    guide=Guide(
+        meaning="The wheel leaves the ground: the linear tyre of the model would pull it back.",
+        check=(
+            "film the contact on the roughest road, or put paper under the tyre: it can be drawn out in the dips;"
+            " 100 % means no pull at all, here {lost_pull}"
+        ),
+        mistaken_for={"bump_stop": "acts when the spring is short, lift-off when the tyre is long"},
+    ),
 )

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
 
 
@@ -41,4 +42,16 @@ EFFECT = Effect(
         EffectParameter("sticking_area", "m2", 0.0, 5e-7, 4e-8, size=True),
     ),
     inputs=inputs,
+    guide=Guide(
+        meaning="The inlet ignores small commands: overlap of the spool, or it sticks and follows in jumps.",
+        check=(
+            "raise one inlet's command slowly from zero with all else closed: no pressure moves below "
+            "{overlap_area}; lower it again: where it stops differs by up to twice {sticking_area} if the spool "
+            "sticks"
+        ),
+        mistaken_for={
+            "orifice_coefficient": "is a factor at every opening",
+            "valve_lag": "shows with large steps as well",
+        },
+    ),
 )

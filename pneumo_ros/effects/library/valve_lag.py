@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
 from pneumo_ros.effects.filters import lagged_hold
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 
@@ -27,4 +28,15 @@ EFFECT = Effect(
     ),
     derived=(Derived("valve_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,
+    guide=Guide(
+        meaning="The valve's opening follows its command late, as a first or second order system.",
+        check=(
+            "step one inlet open at rest and log the pressure at full rate: its rate reaches two thirds only "
+            "after {valve_lag}, in a bend, not at once"
+        ),
+        mistaken_for={
+            "transport_delay": "nothing at all happens for a while, then the full rate",
+            "pressure_lag": "the force (LVDTs) reacts in time, only the gauge is late",
+        },
+    ),
 )

@@ -9,6 +9,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -29,4 +30,17 @@ EFFECT = Effect(
         EffectParameter("growth_with_speed", "s/m", -2.0, 20.0, 0.5),
     ),
     term=PlantTerm(force=force),
+    guide=Guide(
+        meaning=(
+            "The strut's damper, bushing or the air in a hose resists by speed, more or less than the rig file says."
+        ),
+        check=(
+            "vent the bellows, push the body down by 5 mm and let go: the free swing dies faster (slower) than "
+            "modelled; {added_damping} more resist a stroke of 1 m/s"
+        ),
+        mistaken_for={
+            "coulomb_friction": "does not fade with slow motion",
+            "tyre_damping": "acts between axle and road: hold the axle, and it is gone",
+        },
+    ),
 )

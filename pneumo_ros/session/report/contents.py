@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,12 +16,16 @@ from pneumo_ros.session.picture import draw_session
 from pneumo_ros.session.summary import (
     Recorded,
     Summary,
+    change,
+    figures,
     load_session,
     loop_timing,
+    pace,
     ride_rows,
     summarise,
     wall_time,
 )
+from pneumo_ros.session.warnings import warnings_of
 from pneumo_ros.units import SQUARE_INCH
 
 LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
@@ -42,9 +45,15 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
     """
     report = inspect_log(log)
     session = load_session(log.path)
-    if passive is None and not session.rig.diagnosed and len(session.truth) > 1 and len(session.road) > 1:
+    if (
+        passive is None
+        and not session.rig.diagnosed
+        and max(len(session.truth), len(session.measured)) > 1
+        and len(session.road) > 1
+    ):
         passive = passive_session(session)
-    ours = summarise(session, loop_timing(log.path), wall_time(log.path))
+    loop = loop_timing(log.path)
+    ours = summarise(session, loop, wall_time(log.path), warnings_of(log, loop, session.mode))
     theirs = summarise(passive) if passive is not None else None
     findings = check_conformance(log)
     return {
@@ -55,7 +64,10 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "summary": summary_rows(ours, theirs),
         "has_passive": theirs is not None,
         "picture": _picture(session, passive, log.path.name),
-        "speed": f"{ours.speed:.1f}" if math.isfinite(ours.speed) else "",
+        "pace": pace(ours),
+        "judged_by": ours.judged_by,
+        "warnings": ours.warnings,
+        "waits": ours.mode == "lockstep",
         "loop": loop_rows(ours),
         "topics": [topic_row(topic) for topic in report.topics],
         "events": [_event_row(event, report) for event in report.events],
@@ -78,20 +90,12 @@ def summary_rows(ours: Summary, theirs: Summary | None) -> list[Row]:
     passive = ride_rows(theirs.ride) if theirs is not None and theirs.ride is not None else []
     for i, (name, unit, values, form) in enumerate(ride_rows(ours.ride) if ours.ride is not None else []):
         other = passive[i][2] if passive else []
-        rows.append((name, unit, _values(values, form), _values(other, form), _change(values, other)))
-    rows.append(("inlets saturated, f / r", "% of time", _values([100.0 * s for s in ours.saturation], "%.1f"), "", ""))
+        rows.append((name, unit, figures(values, form), figures(other, form), change(values, other)))
+    rows.append(("inlets saturated, f / r", "% of time", figures([100.0 * s for s in ours.saturation], "%.1f"), "", ""))
     if ours.area_error is not None:
-        error = _values([e / SQUARE_INCH for e in ours.area_error], "%.3f")
+        error = figures([e / SQUARE_INCH for e in ours.area_error], "%.3f")
         rows.append(("area estimate, rms error, f / r", "in2", error, "", ""))
     return rows
-
-
-def _values(values: Sequence[float], form: str) -> str:
-    return " / ".join(form % value for value in values)
-
-
-def _change(ours: Sequence[float], theirs: Sequence[float]) -> str:
-    return " / ".join(f"{100.0 * (a / b - 1.0):+.0f} %" for a, b in zip(ours, theirs, strict=False) if b)
 
 
 def loop_rows(summary: Summary) -> list[Row]:
@@ -100,8 +104,10 @@ def loop_rows(summary: Summary) -> list[Row]:
     for node, values in summary.loop.items():
         if values.get("steps", "0") != "0":
             keys = [f"{label} {p} (us)" for label in ("period", "step") for p in ("p50", "p99", "max")]
-            figures = [f"{float(values.get(key, 'nan')) / 1e3:.3g}" for key in keys]
-            rows.append((node, values["steps"], *figures, values.get("missed periods", "")))
+            cells = [f"{float(values.get(key, 'nan')) / 1e3:.3g}" for key in keys]
+            rows.append(
+                (node, values["steps"], *cells, "" if summary.mode == "lockstep" else values.get("missed periods", ""))
+            )
     return rows
 
 

@@ -1,0 +1,183 @@
+"""Logs laid over each other: measured, nominal, corrected and residual of a diagnosis, or two sessions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from bokeh.document import Document
+from bokeh.layouts import column, gridplot, row
+from bokeh.models import (
+    CheckboxButtonGroup,
+    ColumnDataSource,
+    CrosshairTool,
+    CustomJS,
+    HoverTool,
+    Legend,
+    LegendItem,
+    Range1d,
+    Select,
+    TabPanel,
+    Tabs,
+)
+from bokeh.plotting import figure
+from numpy.typing import NDArray
+
+from pneumo_ros.dashboard.panels import thin
+from pneumo_ros.errors import InputError
+from pneumo_ros.log.comparison import align, start_of
+from pneumo_ros.log.reading import Log
+from pneumo_ros.log.topics import DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE
+
+CHANNELS = (*DISPLACEMENT.names, "front_pressure", "rear_pressure")
+PREFIXES = {"measured": "#999999", "nominal": "#1f77b4", "refit": "#9467bd", "corrected": "#2ca02c",
+            "residual": "#d62728"}  # fmt: skip
+PAIR = ("#1f77b4", "#d62728")
+POINTS = 4000  # a curve
+SEGMENT = 1024  # samples of a spectrum's windows
+HEIGHT = 240  # px
+
+
+@dataclass(frozen=True)
+class Series:
+    """One run of the six channels: time (N,) s, values (N, 6) in mm and kPa."""
+
+    name: str
+    colour: str
+    time: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+
+def is_residual(log: Log) -> bool:
+    """Whether the log is a diagnosis's residual.mcap."""
+    return f"/measured{DISPLACEMENT.name}" in log.topics
+
+
+def series_of(log: Log, second: Log | None = None) -> list[Series]:
+    """What can be laid over each other: a residual log's runs, or the measurements of one log or two.
+
+    Raises
+    ------
+    InputError
+        if a log has none of the channels, saying what it has.
+    """
+    if second is None and is_residual(log):
+        prefixes = [name for name in PREFIXES if f"/{name}{DISPLACEMENT.name}" in log.topics]
+        return [_series(log, f"/{name}", name, PREFIXES[name], 0.0) for name in prefixes]
+    first = _series(log, _prefix(log), log.path.name, PAIR[0], 0.0)
+    if second is None:
+        return [first]
+    offset = align(log, second)[1]
+    return [first, _series(second, _prefix(second), second.path.name, PAIR[1], offset)]
+
+
+def _prefix(log: Log) -> str:
+    return "/measured" if is_residual(log) else ""
+
+
+def _series(log: Log, prefix: str, name: str, colour: str, offset: float) -> Series:
+    topics = [prefix + topic.name for topic in (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)]
+    missing = [topic for topic in topics if topic not in log.topics or not log.topics[topic].count]
+    if missing:
+        raise unknown_topics(log, missing)
+    joint = log.select(topics[0], list(DISPLACEMENT.names))
+    pressures = [log.pressure(topic) for topic in topics[1:]]
+    columns = [np.interp(joint.stamp_ns, one.stamp_ns, one.value) * 1e-3 for one in pressures]
+    time = np.asarray((joint.stamp_ns - start_of(log)) * 1e-9 - offset, dtype=np.float64)
+    return Series(name, colour, time, np.column_stack([joint.position * 1e3, *columns]))
+
+
+def unknown_topics(log: Log, wanted: list[str]) -> InputError:
+    """A log without what is to be shown, with what it has."""
+    there = ", ".join(f"{name} ({info.count})" for name, info in log.topics.items() if info.count) or "no message"
+    return InputError(f"nothing to show: no {', '.join(wanted)}", where=log.path, allowed=f"the log has {there}",
+                      remedy="rename its topics, or see docs/topics.md")  # fmt: skip
+
+
+class Overlay:
+    """Three tabs of one document: over time, spectra, one channel over another."""
+
+    def __init__(self, document: Document, title: str, series: list[Series]) -> None:
+        self._series = series
+        document.title = f"pneumo: {title}"
+        tabs = (("over time", self._over_time()), ("spectrum", self._spectra()), ("XY", self._xy()))
+        document.add_root(
+            Tabs(tabs=[TabPanel(child=child, title=name) for name, child in tabs], sizing_mode="stretch_width")
+        )
+
+    def _figure(self, channel: str, **options: Any) -> Any:
+        plot = figure(height=HEIGHT, title=channel.replace("_", " "), sizing_mode="stretch_width",
+                      tools="pan,box_zoom,wheel_zoom,reset,save", **options)  # fmt: skip
+        plot.add_tools(CrosshairTool(), HoverTool(tooltips=[("", "$name"), ("x", "$x{0.0000}"), ("y", "$y{0.0000}")]))
+        return plot
+
+    def _with_legend(self, plot: Any, lines: list[tuple[str, Any]]) -> Any:
+        items = [LegendItem(label=name, renderers=[line]) for name, line in lines]
+        plot.add_layout(Legend(items=items, click_policy="hide", label_text_font_size="10px"), "right")
+        return plot
+
+    def _over_time(self) -> Any:
+        ends = [(float(one.time[0]), float(one.time[-1])) for one in self._series]
+        shared = Range1d(min(a for a, _ in ends), max(b for _, b in ends))
+        plots = []
+        for k, channel in enumerate(CHANNELS):
+            plot = self._figure(channel, x_range=shared, x_axis_label="s", y_axis_label=_unit(k))
+            lines = []
+            for one in self._series:
+                there = np.isfinite(one.values[:, k])
+                t, y = thin(one.time[there], one.values[there, k], POINTS)
+                lines.append((one.name, plot.line(t, y, color=one.colour, name=one.name)))
+            plots.append(self._with_legend(plot, lines))
+        return column(_chooser(plots), gridplot(plots, ncols=2, merge_tools=False, sizing_mode="stretch_width"),
+                      sizing_mode="stretch_width")  # fmt: skip
+
+    def _spectra(self) -> Any:
+        from scipy.signal import welch
+
+        plots = []
+        for k, channel in enumerate(CHANNELS):
+            plot = self._figure(channel, x_axis_type="log", y_axis_type="log", x_axis_label="Hz",
+                                y_axis_label=f"{_unit(k)}2/Hz")  # fmt: skip
+            lines = []
+            for one in self._series:
+                rate = 1.0 / float(np.median(np.diff(one.time)))
+                values = np.nan_to_num(one.values[:, k] - np.nanmean(one.values[:, k]))
+                f, density = welch(values, rate, nperseg=min(SEGMENT, len(values)))
+                lines.append((one.name, plot.line(f[1:], density[1:], color=one.colour, name=one.name)))
+            plots.append(self._with_legend(plot, lines))
+        return gridplot(plots, ncols=2, merge_tools=False, sizing_mode="stretch_width")
+
+    def _xy(self) -> Any:
+        plot = self._figure("one channel over another")
+        across, up = (Select(title=axis, value=CHANNELS[k], options=list(CHANNELS), name=axis)
+                      for axis, k in (("x", 2), ("y", 0)))  # fmt: skip
+        data = [ColumnDataSource({"x": [], "y": []}) for _ in self._series]
+        lines = [(one.name, plot.line("x", "y", source=source, color=one.colour, name=one.name))
+                 for one, source in zip(self._series, data, strict=True)]  # fmt: skip
+
+        def show() -> None:
+            x, y = CHANNELS.index(across.value), CHANNELS.index(up.value)
+            plot.xaxis.axis_label, plot.yaxis.axis_label = f"{across.value}, {_unit(x)}", f"{up.value}, {_unit(y)}"
+            for one, source in zip(self._series, data, strict=True):
+                every = max(1, len(one.time) // POINTS)
+                source.data = {"x": one.values[::every, x], "y": one.values[::every, y]}
+
+        for choice in (across, up):
+            choice.on_change("value", lambda attr, old, new: show())
+        show()
+        plot.height = 2 * HEIGHT
+        return column(row(across, up), self._with_legend(plot, lines), sizing_mode="stretch_width")
+
+
+def _unit(channel: int) -> str:
+    return "mm" if channel < len(DISPLACEMENT.names) else "kPa"
+
+
+def _chooser(plots: list[Any]) -> CheckboxButtonGroup:
+    """Which channels are shown; the browser does it alone."""
+    labels = [channel.replace("_", " ") for channel in CHANNELS]
+    group = CheckboxButtonGroup(labels=labels, active=list(range(len(plots))), name="channels")
+    code = "plots.forEach((plot, k) => { plot.visible = cb_obj.active.includes(k) })"
+    group.js_on_change("active", CustomJS(args={"plots": plots}, code=code))
+    return group

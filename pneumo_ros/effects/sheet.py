@@ -1,0 +1,49 @@
+"""The facts of an effect as words and rows, for the terminal and docs/effects.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pneumo_ros.effects.contract import SENSOR_PLACES, Effect
+
+
+def sites_of(effect: Effect) -> str:
+    """Where it may act, in words."""
+    return ", ".join(site.replace("_", " ") or "the whole rig" for site in effect.sites)
+
+
+def places_of(effect: Effect) -> str:
+    """Places it is blamed on, as the diagnosis writes them."""
+    if not effect.places:
+        return ", ".join(SENSOR_PLACES[site] for site in effect.sites if site in SENSOR_PLACES)
+    return ", ".join(place.replace("{end}", "front|rear") for place in effect.places)
+
+
+def parameter_rows(effect: Effect) -> list[tuple[str, ...]]:
+    """(name, typical, low, high, unit) of each parameter, SI."""
+    return [(p.name, f"{p.typical:g}", f"{p.low:g}", f"{p.high:g}", p.unit) for p in effect.parameters]
+
+
+def check_words(effect: Effect, values: Mapping[str, float] | None = None) -> str:
+    """The check by hand, with ``values`` of the parameters (SI), their typical ones by default; '' without a guide."""
+    if effect.guide is None:
+        return ""
+    known = {p.name: ((values or {}).get(p.name, p.typical), p.unit) for p in effect.parameters}
+    return effect.guide.check_with(known)
+
+
+def effects_page(library: Mapping[str, Effect]) -> str:
+    """All effects, Markdown."""
+    return "\n".join(_section(effect) for _, effect in sorted(library.items()))
+
+
+def _section(effect: Effect) -> str:
+    guide = effect.guide
+    lines = [f"## {effect.id}", "", f"{guide.meaning if guide else effect.summary}", ""]
+    lines += [f"Acts at {sites_of(effect)}; blamed on `{places_of(effect)}`.", ""]
+    lines += ["| parameter | typical | from | to | unit |", "|---|---|---|---|---|"]
+    lines += ["| `" + "` | ".join((row[0], " | ".join(row[1:]))) + " |" for row in parameter_rows(effect)]
+    if guide is not None:
+        lines += ["", f"**By hand** (with typical values): {check_words(effect)}.", ""]
+        lines += [f"- not `{other}`: {difference}" for other, difference in guide.mistaken_for.items()]
+    return "\n".join(lines) + "\n"

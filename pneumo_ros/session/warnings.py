@@ -1,0 +1,51 @@
+"""What a reader of a session's figures must know: periods missed, estimates too late, commands refused."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from pneumo_ros.log.inspection import read_events
+from pneumo_ros.log.reading import Log
+
+MISSED = "missed periods"
+STALE, TRIPPED = "estimate_stale", 2
+REFUSED = {  # node and key of its /diagnostics -> what it means
+    ("controller", "refused commands"): "commands were not finite, so the valves were held at trim",
+    ("daq", "refused commands"): "commands were refused by the driver (too old, or out of range)",
+    ("daq", "commands the board refused"): "commands were refused by the board",
+    ("daq", "samples withheld"): "samples were withheld: a sensor could not be believed",
+    ("daq", "lost frames"): "samples were lost on the line",
+}
+
+
+def warnings_of(log: Log, loop: Mapping[str, Mapping[str, str]], mode: str) -> tuple[str, ...]:
+    """One line each, with counts; nothing is missed in lockstep, where a period waits for its command.
+
+    Parameters
+    ----------
+    log : with /rig/events
+    loop : of :func:`pneumo_ros.session.summary.loop_timing`
+    mode : lockstep or realtime
+    """
+    found = [] if mode == "lockstep" else _missed(loop)
+    events = list(read_events(log))
+    late = sum(event.code == STALE for event in events)
+    if late:
+        found.append(f"{late} times no estimate came in time; the controller then sent the safe command")
+    for (node, key), meaning in REFUSED.items():
+        count = int(float(loop.get(node, {}).get(key, "0")))
+        if count:
+            found.append(f"{count} {meaning}")
+    trips = Counter(event.message for event in events if event.level >= TRIPPED)
+    return (*found, *(f"error: {text}" + (f" ({n} times)" if n > 1 else "") for text, n in trips.items()))
+
+
+def _missed(loop: Mapping[str, Mapping[str, str]]) -> list[str]:
+    out = []
+    for node, values in loop.items():
+        missed, steps = int(values.get(MISSED, "0")), int(values.get("steps", "0"))
+        if missed:
+            share = missed / max(missed + steps, 1)
+            out.append(f"{node} missed {missed} of {missed + steps} periods ({share:.1%}); they were skipped")
+    return out

@@ -1,0 +1,96 @@
+"""Every effect says what it is, what it is mistaken for and how to check it by hand; a mistaken file says where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from pneumo_ros.cli.effects import app
+from pneumo_ros.effects.guide import displayed
+from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.sheet import check_words, effects_page
+from pneumo_ros.errors import InputError
+
+LIBRARY = load_library()
+HEAD = (
+    "from pneumo_ros.effects.contract import ENDS, Effect\nfrom pneumo_ros.effects.parameters import EffectParameter\n"
+)
+GOOD = 'EffectParameter("size", "N", 0.0, 9.0, 1.0, size=True)'
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_the_facts_fit_the_effect(name: str) -> None:
+    effect = LIBRARY[name]
+    assert effect.guide is not None and effect.guide.meaning.endswith(".")
+    assert effect.guide.names() <= {p.name for p in effect.parameters}
+    assert effect.guide.mistaken_for and set(effect.guide.mistaken_for) <= set(LIBRARY) - {name}
+    said = check_words(effect)
+    assert "{" not in said and len(said) > 40
+
+
+def test_the_check_takes_what_was_found() -> None:
+    said = check_words(LIBRARY["coulomb_friction"], {"friction_force": 16.2})
+    assert "twice 16.2 N between up and down" in said
+    assert displayed(0.0042, "m") == "4.2 mm" and displayed(0.03, "1") == "3 %" and displayed(2e-7, "m2") == "0.2 mm2"
+
+
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_an_effect_is_read_on_the_terminal(width: str) -> None:
+    done = CliRunner().invoke(app, ["leak"], env={"COLUMNS": width})
+    assert done.exit_code == 0 and max(map(len, done.output.splitlines())) <= int(width)
+    words = " ".join(done.output.split())
+    for part in ("leak:", "acts at front, rear, both", "front|rear_air", "leak_area", "2e-07", "by hand", "0.2 mm2",
+                 "not supply_droop"):  # fmt: skip
+        assert part in words, words
+    listed = CliRunner().invoke(app, [], env={"COLUMNS": width})
+    assert all(name in listed.output for name in LIBRARY) and "…" not in listed.output
+
+
+def test_a_wrong_name_is_told_with_all_of_them() -> None:
+    error = CliRunner().invoke(app, ["valve_leg"]).exception
+    assert isinstance(error, InputError) and "did you mean 'valve_lag'?" in str(error)
+    assert all(name in str(error) for name in LIBRARY)
+
+
+def test_the_page_has_every_effect() -> None:
+    page = effects_page(LIBRARY)
+    assert all(f"## {name}\n" in page for name in LIBRARY)
+
+
+MISTAKES = {
+    "an unknown field": (
+        f'EFFECT = Effect(\n    id="x", sumary="x", sites=ENDS, places=(), parameters=({GOOD},),\n)\n',
+        ["mine.py:3", "Effect has no such field", "'sumary'", "summary", "places", "did you mean 'summary'?"],
+    ),
+    "a missing field": (
+        'EFFECT = Effect(id="x", summary="x")\n', ["mine.py:3", "Effect lacks", "sites", "parameters", "guide"],
+    ),
+    "bounds the wrong way": (
+        'SIZE = EffectParameter("size", "N", 9.0, 1.0, 2.0)\n', ["mine.py:3", "low 9 is not below high 1"],
+    ),
+    "a typical value outside": (
+        'SIZE = EffectParameter("size", "N", 0.0, 1.0, 2.0)\n', ["mine.py:3", "typical 2 is outside low 0 to high 1"],
+    ),
+    "an unknown place": (
+        f'EFFECT = Effect(id="x", summary="x", sites=ENDS, places=("frnt_air",), parameters=({GOOD},))\n',
+        ["mine.py:3", "unknown place 'frnt_air'", "front_air", "{end}_force"],
+    ),
+    "an unknown site": (
+        f'EFFECT = Effect(id="x", summary="x", sites=("left",), places=(), parameters=({GOOD},))\n',
+        ["mine.py:3", "unknown site 'left'", "'both'"],
+    ),
+    "broken Python": ("def term(:\n", ["mine.py:3", "SyntaxError"]),
+    "an error on the way": ("SIZE = 1.0\nSHARE = SIZE / 0.0\n", ["mine.py:4", "ZeroDivisionError"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_in_a_file_is_one_line_with_its_place(tmp_path: Path, case: str) -> None:
+    text, told = MISTAKES[case]
+    (tmp_path / "mine.py").write_text(HEAD + text, encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        load_library([tmp_path / "mine.py"])
+    said = str(error.value)
+    assert "\n" not in said and all(part in said for part in told), said

@@ -1,0 +1,101 @@
+"""What a person reads of logs day by day: info and compare at 80 and 120 columns, merged tables, a replay of valves."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from helpers.rig_logs import noisy, simulated, write_log
+from helpers.small_logs import contract_log, write
+from scipy.io import loadmat
+from typer.testing import CliRunner
+
+from pneumo_ros.cli.log import app
+from pneumo_ros.cli.replay import app as replay_app
+from pneumo_ros.errors import InputError
+from pneumo_ros.log.comparison import align, compare
+from pneumo_ros.log.reading import read_log
+from pneumo_ros.log.tables import merged
+from pneumo_ros.rig import load_rig
+
+
+def said(*words: object, width: int = 80) -> str:
+    done = CliRunner().invoke(app, [str(word) for word in words], env={"COLUMNS": str(width)})
+    assert done.exit_code == 0, done.output
+    return done.output
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Path]:
+    """The same road twice, the second time a second later on a heavier rig; and another road."""
+    folder = tmp_path_factory.mktemp("logs")
+    clean, road, commands = simulated(6.0, 1)
+    first = write_log(folder / "first.mcap", noisy(clean, 1), road, commands, [load_rig().to_yaml()])
+    heavier = load_rig().with_values(sprung_mass=55.0).to_yaml()
+    wait = [np.vstack([np.repeat(part[:1], 500, axis=0), part]) for part in (noisy(clean, 2), road, commands)]
+    second = write_log(folder / "second.mcap", *wait, [heavier])
+    other, its_road, its_commands = simulated(6.0, 2)
+    third = write_log(folder / "third.mcap", noisy(other, 3), its_road, its_commands, [load_rig().to_yaml()])
+    return first, second, third
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_info_fits_the_terminal_and_tells_events_first(tmp_path: Path, width: int) -> None:
+    text = said("info", write(tmp_path / "run.mcap", contract_log(300)), width=width)
+    assert "…" not in text and max(map(len, text.splitlines())) <= width
+    assert text.index("events") < text.index("Topics") < text.index("What explains the run")
+    assert "/rig/displacement" in text and "500" in text
+
+
+def test_logs_are_laid_over_each_other_by_their_road(logs: tuple[Path, Path, Path]) -> None:
+    first, second, third = map(read_log, logs)
+    assert align(first, second) == ("same", pytest.approx(1.0, abs=2e-3))
+    assert align(first, third) == ("two", 0.0)
+    gap = {s.column: s for s in compare(first, second).signals if s.topic == "/rig/displacement"}["sprung_front"]
+    assert gap.unit == "m" and gap.rms < 3e-5  # two draws of 10 um
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_compare_says_units_roads_and_rigs(logs: tuple[Path, Path, Path], width: int) -> None:
+    text = said("compare", logs[0], logs[1], width=width)
+    assert "two rigs: sprung_mass differ" in text and "same road; the second log is moved by -1.000 s" in text
+    assert "kPa" in text and "mm2" in text and "nan" not in text and "…" not in text.split("Signals")[1]
+    assert "two roads" in said("compare", logs[0], logs[2], width=width)
+
+
+def test_one_merged_table_in_every_format(tmp_path: Path, logs: tuple[Path, Path, Path]) -> None:
+    log = read_log(logs[0])
+    content = merged(log)
+    assert len(content["time"]) == 3000 and content["time"][1] == pytest.approx(2e-3)
+    assert np.array_equal(content["/valve/command/front_inlet"], log.joint("/valve/command").position[:, 0])
+    for kind in ("csv", "parquet", "mat"):
+        said("export", logs[0], "-o", tmp_path, "-f", kind, "--merged")
+    table = pyarrow.parquet.read_table(tmp_path / "first.parquet")
+    pressure = content["/rig/front/pressure/fluid_pressure"]
+    assert np.array_equal(table["/rig/front/pressure/fluid_pressure"].to_numpy(), pressure)
+    matrix = loadmat(tmp_path / "first.mat")
+    assert np.array_equal(matrix["rig_front_pressure_fluid_pressure"][:, 0], pressure)
+    with (tmp_path / "first.csv").open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["/rig/front/pressure/fluid_pressure"]) for row in rows] == pressure.tolist()
+    error = CliRunner().invoke(app, ["export", str(logs[0]), "-o", str(tmp_path), "-f", "csv", "--merged"]).exception
+    assert isinstance(error, InputError) and "exists already" in str(error)
+
+
+def test_recorded_valves_play_through_any_rig(tmp_path: Path, logs: tuple[Path, Path, Path]) -> None:
+    """The rig the log was made on gives the log again, to its noise; a heavier one does not."""
+    same = CliRunner().invoke(replay_app, [str(logs[0]), "--open-loop"], env={"COLUMNS": "100"})
+    assert same.exit_code == 0, same.output
+    rows = [line.split() for line in same.output.splitlines() if line.strip().startswith(("sprung", "unsprung"))]
+    assert len(rows) == 4 and all(float(row[-1]) < 0.02 for row in rows)
+    (tmp_path / "heavy.yaml").write_text("rig: {sprung_mass: {value: 60.0, std: 0.1, unit: kg}}", encoding="utf-8")
+    words = [str(logs[0]), "--open-loop", "--rig", str(tmp_path / "heavy.yaml")]
+    heavy = CliRunner().invoke(replay_app, words, env={"COLUMNS": "100"})
+    assert "leaves these out" in heavy.output
+    other = [line.split() for line in heavy.output.splitlines() if line.strip().startswith("sprung_front")]
+    assert float(other[0][-1]) > 0.3
+    clash = CliRunner().invoke(replay_app, [str(logs[0]), "--open-loop", "--stepped"]).exception
+    assert isinstance(clash, InputError) and "--open-loop" in str(clash)
