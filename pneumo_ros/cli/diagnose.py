@@ -101,7 +101,7 @@ def diagnose(
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
-        files.append(save_corrected_rig(found, task.model, save_rig, effect or ()))
+        files.append(save_corrected_rig(found, task.model, save_rig))
     _show(console, found, {name: effect.summary for name, effect in task.model.library.items()}, task.fit)
     if found.experiment is not None:
         console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)

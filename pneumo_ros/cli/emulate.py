@@ -72,6 +72,11 @@ def emulate(
     prefer_this_process()
     freeze_startup_objects()
     if the_rig.effects:
+        from pneumo_ros.effects.configured import library_of
+        from pneumo_ros.effects.loading import origins
+
+        for text in origins(library_of(the_rig)):
+            console.print(text, soft_wrap=True)
         console.print("with its effects: " + ", ".join(one.label for one in the_rig.effects), soft_wrap=True)
     console.print(f"emulating the rig on {link}; Ctrl-C ends it; try", soft_wrap=True)
     console.print(f"  pneumo run --source serial --port {link} --calibration {calibration}", soft_wrap=True)

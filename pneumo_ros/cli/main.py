@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import import_module
 from typing import Annotated, Any
@@ -66,8 +67,19 @@ def root(
     """Active pneumatic half-car rig: run, log, replay, and diagnose the sim-to-real gap."""
 
 
+def _trust_no_working_folder() -> None:
+    """A folder of logs from elsewhere may hold anything: neither modules nor settings of compilers are taken from it.
+
+    Numba reads ``.numba_config.yaml`` of the working folder and would load compiled code from where that says; what
+    the environment names comes first. ``python -m`` looks for modules in the working folder unless told not to.
+    """
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
+
+
 def main() -> None:
     """Entry point: a mistake of the user is one line on standard error and exit code 2."""
+    _trust_no_working_folder()
     try:
         app()
     except PneumoError as error:

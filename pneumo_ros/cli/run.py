@@ -189,6 +189,11 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
 
 def _tell_effects(console: Console, rig: Rig, source: str) -> None:
     """Who acts on the rig's effects: the simulated rig does, the hardware has its own."""
+    from pneumo_ros.effects.configured import library_of
+    from pneumo_ros.effects.loading import origins
+
+    for text in origins(library_of(rig)):
+        console.print(text, soft_wrap=True)
     names = ", ".join(one.label for one in rig.effects)
     if source == "serial":
         console.print(f"not simulated, for the hardware has its own: {names}; the log's rig names them", soft_wrap=True)
@@ -306,10 +311,12 @@ def _save_what_is_left(target: Path) -> None:
 def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.cli.passive import passive_run
+    from pneumo_ros.rig import load_rig
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
 
     session = load_session(target)
-    other = passive_run(session)
+    own = load_rig(str(values["road_profile"].get("rig", "")) or None)
+    other = passive_run(session, own)
     ours = summarise(session, loop_timing(target), wall_time(target))
     theirs = summarise(other) if other is not None else None
     console.print(summary_table(ours, theirs))

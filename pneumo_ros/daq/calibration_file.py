@@ -20,6 +20,7 @@ from pneumo_ros.daq.calibration import (
     ValveCalibration,
     units_of,
 )
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 
@@ -67,13 +68,7 @@ def load_calibration(name: str | Path | None = None) -> Calibration:
 
 def parse_calibration(text: str, where: str) -> Calibration:
     """Read a calibration from YAML text; ``where`` names it in errors."""
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
-    root = _mapping(document, "calibration", where)
+    root = _mapping(parse_yaml(text, where), "calibration", where)
     sensors = _entries(root, "sensors", SENSORS, where)
     valves = _entries(root, "valves", VALVES, where)
     return Calibration(

@@ -8,9 +8,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pneumo_ros.daq.calibration import VALVES
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 
@@ -98,11 +97,10 @@ def load_safety(path: str | Path | None = None) -> SafetyConfig:
     """
     source = Path(path) if path else share_file("config", "safety.yaml")
     try:
-        document = yaml.safe_load(source.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        text = " ".join(str(error).split())
-        raise InputError(f"cannot read the safety file ({text})", where=source, remedy="give readable YAML") from error
-    return parse_safety(document, str(source))
+        text = source.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the safety file ({error})", where=source, remedy="give readable YAML") from error
+    return parse_safety(parse_yaml(text, source), str(source))
 
 
 def parse_safety(document: object, where: str) -> SafetyConfig:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 
@@ -91,13 +92,15 @@ class NamedEffect:
     effect : id
     site : "front", "rear", "both", "" (the whole rig) or a channel
     parameters : name and value, SI
-    file : Python file that defines it; empty for an effect of the library
+    source : SHA-256 of the Python source that defines it; empty for an effect of the library
+    file : that source, only where the user gave the rig as a file and it stands beside it: never out of a log
     """
 
     effect: str
     site: str
     parameters: tuple[tuple[str, float], ...]
-    file: str = ""
+    source: str = ""
+    file: str = field(default="", compare=False)
 
     @property
     def label(self) -> str:
@@ -105,9 +108,13 @@ class NamedEffect:
         return f"{self.effect} ({self.site or 'rig'})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Entry of the list ``effects:``."""
+        """Entry of the list ``effects:``, as a log carries it: no path."""
         out = {"effect": self.effect, "site": self.site, "parameters": dict(self.parameters)}
-        return {**out, "file": self.file} if self.file else out
+        return {**out, "source": self.source} if self.source else out
+
+    def to_saved_dict(self) -> dict[str, Any]:
+        """The same for a rig file, with the name of the Python file that stands beside it."""
+        return {**self.to_dict(), "file": Path(self.file).name} if self.file else self.to_dict()
 
 
 @dataclass(frozen=True)
@@ -188,13 +195,13 @@ class Rig:
             out[name] = {"value": q.value, "std": q.std, "unit": q.unit}
         return out
 
-    def to_yaml(self) -> str:
-        """The text that /rig/config carries."""
+    def to_yaml(self, saved: bool = False) -> str:
+        """The text that /rig/config carries; ``saved``: that of a rig file, which names files beside itself."""
         document: dict[str, Any] = {"rig": self.to_dict()}
         if self.ends:
             document["ends"] = {name: {"value": value, "unit": END_LIMITS[name].unit} for name, value in self.ends}
         if self.effects:
-            document["effects"] = [one.to_dict() for one in self.effects]
+            document["effects"] = [one.to_saved_dict() if saved else one.to_dict() for one in self.effects]
         return yaml.safe_dump(document, sort_keys=False)
 
 
@@ -213,25 +220,26 @@ def load_rig(path: str | Path | None = None) -> Rig:
         raise InputError(
             f"cannot read the rig file ({error})", where=source, remedy="give a readable YAML file"
         ) from error
-    return parse_rig(text, str(source))
+    return parse_rig(text, str(source), source.parent)
 
 
-def parse_rig(text: str, where: str = "rig") -> Rig:
+def parse_rig(text: str, where: str = "rig", folder: Path | None = None) -> Rig:
     """Read a rig from YAML text; ``where`` names the text in errors.
 
     A key that the text leaves out keeps the nominal value, except that a text without ``rig:`` is refused.
+
+    Parameters
+    ----------
+    folder : of the rig file that the user named, where files of effects may stand; without it (a log's rig) no path
+        that the text names is taken, let alone opened
     """
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
+    document = parse_yaml(text, where)
     if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
         raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
     own = {key: document[key] for key in ("model_form",) if key in document}  # some write it beside the rig's numbers
     rig = _from_mapping({**own, **document["rig"]}, where)
-    return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
+    effects = _effects(document.get("effects"), where, folder)
+    return replace(rig, ends=_ends(document.get("ends"), where), effects=effects)
 
 
 def _ends(entries: object, where: str) -> tuple[tuple[str, float], ...]:
@@ -260,15 +268,15 @@ def _end(name: str, entry: object, where: str) -> float:
     return value
 
 
-def _effects(entries: object, where: str) -> tuple[NamedEffect, ...]:
+def _effects(entries: object, where: str, folder: Path | None) -> tuple[NamedEffect, ...]:
     if entries is None:
         return ()
     if not isinstance(entries, list):
         raise InputError("not a list", where=where, key="effects", value=entries, remedy="write it as --save-rig does")
-    return tuple(_effect(k, entry, where) for k, entry in enumerate(entries))
+    return tuple(_effect(k, entry, where, folder) for k, entry in enumerate(entries))
 
 
-def _effect(number: int, entry: object, where: str) -> NamedEffect:
+def _effect(number: int, entry: object, where: str, folder: Path | None) -> NamedEffect:
     key = f"effects[{number}]"
     parameters = entry.get("parameters") if isinstance(entry, Mapping) else None
     if not isinstance(entry, Mapping) or "effect" not in entry or not isinstance(parameters, Mapping):
@@ -277,7 +285,18 @@ def _effect(number: int, entry: object, where: str) -> NamedEffect:
             remedy="write {effect: ID, site: front|rear|both|..., parameters: {name: value}}",
         )  # fmt: skip
     values = tuple((str(name), _number(f"{key}.parameters.{name}", v, where)) for name, v in parameters.items())
-    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("file") or ""))
+    file = _beside(str(entry.get("file") or ""), folder, f"{key}.file", where)
+    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("source") or ""), file)
+
+
+def _beside(name: str, folder: Path | None, key: str, where: str) -> str:
+    """The path of a file beside the rig file."""
+    if not name or folder is None:
+        return ""
+    if Path(name).name != name or (folder / name).resolve().parent != folder.resolve():
+        raise InputError("not beside the rig file", where=where, key=key, value=name, allowed="a file's name alone",
+                         remedy=f"put the file into {folder} and write its name")  # fmt: skip
+    return str((folder / name).resolve())
 
 
 def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:

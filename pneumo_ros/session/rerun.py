@@ -53,7 +53,13 @@ class Rerun:
     notes: tuple[str, ...]
 
 
-def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, build: Build | None = None) -> Rerun:
+def rerun(
+    log: Log,
+    overrides: Overrides | None = None,
+    rig: Rig | None = None,
+    build: Build | None = None,
+    valves: Path | None = None,
+) -> Rerun:
     """Run the recorded road through a rig, from rest.
 
     Parameters
@@ -62,6 +68,7 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     overrides : node -> parameter -> value, over the recorded parameters
     rig : in place of the log's
     build : makes the rig to step, for one with effects; without it the nominal equations run
+    valves : the profile that the session played, if it played one
 
     Raises
     ------
@@ -74,7 +81,9 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     setups = list(read_setups(log))
     rig, period = rig or log.config or load_rig(), control_period(log, setups, notes)
     given = overrides or {}
-    values = {node: plan(setups, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
+    values = {
+        node: plan(setups, node, given.get(node, {}), notes, valves).start for node in ("estimator", "controller")
+    }
     measured = measurements(log)
     start = int(measured.stamp_ns[0])
     road = _road(log, start, int(measured.stamp_ns[-1]), period)
