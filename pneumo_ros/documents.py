@@ -17,6 +17,7 @@ from pneumo_ros.errors import InputError
 MAX_TEXT = 4_000_000  # characters; the largest text this package writes, a diagnosis, has 100,000
 MAX_DEPTH = 40
 MAX_ENTRIES = 200_000
+LARGEST = 1e300  # YAML has whole numbers of any length; a comparison refuses them, infinities and NaN alike
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # ten times faster where libyaml is there
 _BRACKETS = re.compile(r'"(?:[^"\\]|\\.)*"|[\[{\]}]', re.DOTALL)
 

@@ -63,8 +63,16 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def root(
     version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")] = False,
+    max_chunk: Annotated[
+        int | None,
+        typer.Option(help="Largest chunk of a log that is unpacked, MiB; 256 by default.", min=1, max=4096),
+    ] = None,
 ) -> None:
     """Active pneumatic half-car rig: run, log, replay, and diagnose the sim-to-real gap."""
+    if max_chunk is not None:
+        from pneumo_ros.log.bounds import set_chunk_limit
+
+        set_chunk_limit(max_chunk)
 
 
 def _trust_no_working_folder() -> None:

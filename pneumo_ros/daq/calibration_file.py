@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
@@ -20,8 +19,9 @@ from pneumo_ros.daq.calibration import (
     ValveCalibration,
     units_of,
 )
-from pneumo_ros.documents import parse_yaml
+from pneumo_ros.documents import LARGEST, parse_yaml
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.paths import share_file
 
 SENSOR_KEYS = ("gain", "offset", "unit", "zero", "date", "residual", "interval", "source")
@@ -89,9 +89,8 @@ def calibration_to_yaml(calibration: Calibration) -> str:
 def save_calibration(calibration: Calibration, path: str | Path) -> None:
     """Write the YAML form; the name appears only when the file is complete."""
     target = Path(path)
-    part = target.with_name(target.name + ".part")
-    part.write_text(calibration_to_yaml(calibration), encoding="utf-8")
-    part.replace(target)
+    with new_file(target) as part:
+        part.write_text(calibration_to_yaml(calibration), encoding="utf-8")
 
 
 def _mapping(entry: object, key: str, where: str) -> dict[str, Any]:
@@ -121,7 +120,7 @@ def _checked(name: str, entry: object, keys: tuple[str, ...], units: Mapping[str
     for key in ("gain", "offset", "unit"):
         if key not in entry:
             raise InputError("key missing", where=where, key=f"{name}.{key}", remedy="add it")
-    if entry["unit"] not in units:
+    if str(entry["unit"]) not in units:
         raise InputError("unknown unit", where=where, key=f"{name}.unit", value=entry["unit"], allowed=", ".join(units))
     out = dict(entry)
     for key in ("gain", "offset", "zero", "residual", "interval"):
@@ -146,6 +145,6 @@ def _valve(name: str, entry: object, where: str) -> ValveCalibration:
 
 
 def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError("not a finite number", where=where, key=key, value=raw, allowed="a finite number")
     return float(raw)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pneumo_ros.daq.calibration import VALVES
-from pneumo_ros.documents import parse_yaml
+from pneumo_ros.documents import LARGEST, parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 
@@ -189,6 +189,6 @@ def _numbers(root: Mapping[str, Any], key: str, names: tuple[str, ...], where: s
 
 
 def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError("not a finite number", where=where, key=key, value=raw, allowed="a finite number like 4.5e+5")
     return float(raw)

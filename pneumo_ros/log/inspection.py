@@ -169,8 +169,7 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
     """One topic; topics that are not CDR are timed by their log times."""
     info = log.info(name)
     if info.encoding == "cdr" and info.count:
-        columns = log.columns(name)
-        stamps, logged = columns.stamp_ns, columns.log_time_ns
+        stamps, logged = log.stamps(name)
     else:
         stamps = logged = log.records(name).log_time_ns
     # Events and health come from several nodes at once: their stamps say nothing about a rate.

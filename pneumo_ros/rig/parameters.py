@@ -6,7 +6,6 @@ carries its own copy under ``/rig/config``.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from pneumo_ros.documents import parse_yaml
+from pneumo_ros.documents import LARGEST, parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 
@@ -386,7 +385,7 @@ def _checked(name: str, raw: object, where: str) -> float:
 
 
 def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError(
             "not a finite number",
             where=where,

@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
+from pneumo_ros.files import new_file
 from pneumo_ros.session.summary import Recorded, static_tyre_loads
 from pneumo_ros.units import DEGREE
 
@@ -31,10 +32,9 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
             axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.margins(x=0)
     figure.suptitle(title)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
+    with new_file(path) as part:
+        figure.savefig(part, dpi=110, format="png")
     plt.close(figure)
-    part.rename(path)
 
 
 def _motion(heave: Axes, pitch: Axes, session: Recorded, passive: Recorded | None) -> None:

@@ -18,6 +18,7 @@ from pneumo_ros.control.half_car import PROFILE, build_controller
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import build_estimator
+from pneumo_ros.files import new_file
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import read_setups, seed_of
 from pneumo_ros.log.reading import Log
@@ -174,7 +175,6 @@ def draw_rerun(result: Rerun, path: Path, title: str) -> None:
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(title, fontsize=10)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
+    with new_file(path) as part:
+        figure.savefig(part, dpi=110, format="png")
     plt.close(figure)
-    part.replace(path)

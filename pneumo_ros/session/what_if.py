@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from pneumo_ros.files import new_file
 from pneumo_ros.log import topics
 from pneumo_ros.log.topics import Topic
 from pneumo_ros.rig import Rig
@@ -109,10 +110,9 @@ def draw_overlay(replayed: Replayed, path: Path, title: str) -> None:
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
     figure.suptitle(f"{title}\n{CAVEAT}", fontsize=10)
-    part = path.with_name(path.name + ".part")
-    figure.savefig(part, dpi=110, format="png")
+    with new_file(path) as part:
+        figure.savefig(part, dpi=110, format="png")
     plt.close(figure)
-    part.replace(path)
 
 
 def _draw(axis: Axes, found: Track, k: int, factor: float, start: int, label: str, colour: str, width: float) -> None:

@@ -21,6 +21,7 @@ from pneumo_ros.effects.loading import origin_of
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import NUISANCE, RigModel
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
 
 _OUTLETS = ("outlet_area_front", "outlet_area_rear")
@@ -81,13 +82,12 @@ def save_corrected_rig(found: Diagnosis, model: RigModel, path: Path) -> Path:
     InputError
         if the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
     rig = corrected_rig(found, model)
     try:
         for one in rig.effects:
             _put_beside(one, path.parent)
-        part.write_text(rig.to_yaml(saved=True), encoding="utf-8")
-        part.replace(path)
+        with new_file(path) as part:
+            part.write_text(rig.to_yaml(saved=True), encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the rig ({error})", where=path, remedy="choose another path") from error
     return path

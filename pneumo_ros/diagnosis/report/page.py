@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 from pneumo_ros.diagnosis.report.contents import Findings, contents
 from pneumo_ros.diagnosis.report.rig_map import colour
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 
 TEMPLATE = "template.html.j2"
 
@@ -37,9 +38,8 @@ def write_report(path: Path, found: Findings) -> None:
     InputError
         if the folder cannot be written.
     """
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(render(found), encoding="utf-8")
-        part.replace(path)
+        with new_file(path) as part:
+            part.write_text(render(found), encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the report ({error})", where=path, remedy="choose another folder") from error

@@ -8,6 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.log.reading import Log
 from pneumo_ros.session.report.contents import contents
 from pneumo_ros.session.summary import Recorded
@@ -36,10 +37,9 @@ def write_report(log: Log, path: Path, passive: Recorded | None = None) -> None:
     InputError
         if the log is of no rig, or the page cannot be written.
     """
-    part = path.with_name(path.name + ".part")
     page = render(log, passive)
     try:
-        part.write_text(page, encoding="utf-8")
-        part.replace(path)
+        with new_file(path) as part:
+            part.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the report ({error})", where=path, remedy="choose another folder") from error
