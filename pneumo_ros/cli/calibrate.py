@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.daq.calibration_fit import Fit
 
 
@@ -118,7 +117,7 @@ def _check(name: str, adc_bits: int, adc_range: float) -> None:
 
 
 def _console() -> Console:
-    from rich.console import Console
+    from pneumo_ros.cli.terminal import Console
 
     return Console()
 

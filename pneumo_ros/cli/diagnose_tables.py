@@ -6,8 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from rich.console import Console
-
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 from pneumo_ros.thesis.bench_tables import Judged, TableDiagnosis, diagnose_tables
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.parameters import Value
     from pneumo_ros.road import Road
 
@@ -42,8 +41,7 @@ def emulate(
     import signal
     import time
 
-    from rich.console import Console
-
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.daq.calibration_file import load_calibration
     from pneumo_ros.daq.emulator.board import board_identity
     from pneumo_ros.daq.emulator.emulator import Emulator

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
+
+from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
     from pneumo_ros.log.comparison import Comparison

@@ -8,11 +8,11 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from typer.core import TyperGroup
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import PneumoError
 
 BAD_INPUT = 2

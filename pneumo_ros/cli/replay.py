@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.documents import parse_json
 from pneumo_ros.errors import InputError
 

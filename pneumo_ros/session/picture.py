@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from pneumo_ros.files import new_file
+from pneumo_ros.printable import printable
 from pneumo_ros.session.summary import Recorded, static_tyre_loads
 from pneumo_ros.units import DEGREE
 
@@ -31,7 +32,7 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
         if axis.get_legend_handles_labels()[0]:
             axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.margins(x=0)
-    figure.suptitle(title)
+    figure.suptitle(printable(title), parse_math=False)
     with new_file(path) as part:
         figure.savefig(part, dpi=110, format="png")
     plt.close(figure)

@@ -37,6 +37,7 @@ ALIASES = {"lambda": "pole"}  # the thesis's letter for the triple pole
 # A parameter change is logged when the recorder hears of it, a few samples off; within this the recorded outputs
 # themselves show at which sample it took effect.
 CHANGE_WINDOW_NS = 200_000_000
+FASTEST = 1e5  # Hz
 _DEFAULT_RATE = 500.0  # Hz
 
 Overrides = Mapping[str, Mapping[str, Value]]
@@ -200,11 +201,18 @@ def control_period(log: Log, setups: Sequence[Setup], notes: list[str]) -> float
     """The session's control period, s: from its parameters, else from the measurements' stamps."""
     for setup in setups:
         if setup.node in TABLES and "rate_hz" in setup.parameters:
-            return round(1e9 / float(setup.parameters["rate_hz"])) * 1e-9
+            return round(1e9 / _rate(setup)) * 1e-9
     steps = np.diff(log.joint(topics.DISPLACEMENT.name).stamp_ns)
     period = float(np.median(steps)) * 1e-9 if len(steps) else 1.0 / _DEFAULT_RATE
     notes.append(f"the log does not state its control rate; {1.0 / period:.6g} Hz is taken from its stamps")
     return period
+
+
+def _rate(setup: Setup) -> float:
+    rate = setup.parameters["rate_hz"]
+    if isinstance(rate, int | float) and FASTEST >= rate > 1.0 / FASTEST:
+        return float(rate)
+    raise InputError("no control rate", where=setup.node, key="rate_hz", value=rate, allowed=f"up to {FASTEST:g} Hz")
 
 
 def plan(

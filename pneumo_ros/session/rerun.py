@@ -24,6 +24,7 @@ from pneumo_ros.log.inspection import read_setups, seed_of
 from pneumo_ros.log.reading import Log
 from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.printable import printable
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.session.replay import Overrides, control_period, has, measurements, plan, track
 from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Stage
@@ -174,7 +175,7 @@ def draw_rerun(result: Rerun, path: Path, title: str) -> None:
         axis.margins(x=0)
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(printable(title), fontsize=10, parse_math=False)
     with new_file(path) as part:
         figure.savefig(part, dpi=110, format="png")
     plt.close(figure)

@@ -10,6 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.log.reading import Log
+from pneumo_ros.printable import shown
 from pneumo_ros.session.report.contents import contents
 from pneumo_ros.session.summary import Recorded
 
@@ -19,7 +20,9 @@ TEMPLATE = "template.html.j2"
 def render(log: Log, passive: Recorded | None = None) -> str:
     """The page's HTML; it refers to nothing outside itself."""
     source = resources.files(__package__).joinpath(TEMPLATE).read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=shown
+    )
     return environment.from_string(source).render(contents(log, passive))
 
 
