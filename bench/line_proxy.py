@@ -1,8 +1,8 @@
 """A hostile serial line, counted: ``python bench/line_proxy.py --frames 1000000``.
 
 Driver, board rules and rig on one simulated clock; between them a proxy that drops, duplicates, reorders, delays,
-flips, truncates, floods, plays old frames and whole old sessions, other sessions and versions, zeros and silence, in one
-direction or both. A witness knows what both ends really said.
+flips, truncates, floods, plays old frames and whole old sessions, other sessions and versions, zeros and silence, in
+one direction or both. A witness knows what both ends really said.
 """
 
 from __future__ import annotations

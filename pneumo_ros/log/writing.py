@@ -274,9 +274,7 @@ class LogWriter:
 def _new_stream(part: Path) -> FileIO:
     """The growing file, never through a link; readable too, should its folder vanish."""
     try:
-        return cast(
-            "FileIO", part.open("w+b", 0, opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW, 0o666))
-        )
+        return FileIO(part, "w+", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW, 0o666))
     except OSError as error:
         raise InputError(f"cannot create the log ({error})", where=part, remedy="choose another folder") from error
 

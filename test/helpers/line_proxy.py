@@ -11,6 +11,7 @@ from cobs import cobs
 
 from helpers.simulated_rig import MS, SAFE, Bench
 from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.frames import Command, CommandFlag, DeviceState, FrameError, Sample, checksum, decode
 from pneumo_ros.daq.intake import Measurement
 
@@ -125,7 +126,7 @@ class Witness:
     def __init__(self, seed: int, recorded: tuple[list[bytes], list[bytes]] = ([], [])) -> None:
         self.rng = random.Random(seed)
         self.up, self.down = Line(self.rng, recorded[0]), Line(self.rng, recorded[1])
-        self.bench = bench = Bench()
+        self.bench = bench = Bench(board_identity(boot_id=1000 + seed))
         self.said: dict[tuple[int, int], tuple[int, ...]] = {}  # what the board sampled, by session and sequence
         self.asked: deque[tuple[int, tuple[int, ...]]] = deque(maxlen=400)  # ARM commands the host sent
         self.values = self.arms = self.trips = 0

@@ -74,7 +74,7 @@ def test_a_full_disk_that_gives_back_the_reserve(tmp_path: Path, monkeypatch: py
     written = record(LogWriter(tmp_path / "log.mcap"))
     assert not written.complete and "No space left" in written.reason and written.path.name == "log.mcap"
     assert read_back(written) == written.counts["/rig/displacement"] > 500 * (after + 1) - 1
-    assert [m for m in read_log(written.path).metadata if m.name == "session"][0].metadata["complete"] == "false"
+    assert next(m for m in read_log(written.path).metadata if m.name == "session").metadata["complete"] == "false"
 
 
 def test_a_folder_that_is_removed(tmp_path: Path) -> None:
