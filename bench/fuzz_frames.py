@@ -53,7 +53,7 @@ def mutated(rng: random.Random, corpus: list[bytes]) -> bytes:
                 data[place:] = rng.choice(corpus)[place:]
             case _:
                 content = (
-                    rng.randbytes(rng.randint(0, 40)) if rng.random() < 0.5 else bytes([1, 0x10]) + rng.randbytes(38)
+                    rng.randbytes(rng.randint(0, 40)) if rng.random() < 0.5 else bytes([2, 0x10]) + rng.randbytes(42)
                 )
                 data = bytearray(cobs.encode(content + struct.pack("<H", binascii.crc_hqx(content, 0xFFFF))))
     return bytes(data[:300])

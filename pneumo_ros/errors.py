@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from pneumo_ros.printable import printable
+
 
 class PneumoError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
@@ -46,7 +48,7 @@ class InputError(PneumoError):
             parts.append(f"; allowed: {self.allowed}")
         if self.remedy is not None:
             parts.append(f"; {self.remedy}")
-        return " ".join("".join(parts).split())
+        return printable(" ".join("".join(parts).split()))
 
 
 def not_one_of(

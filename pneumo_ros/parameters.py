@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from pneumo_ros.documents import LARGEST
 from pneumo_ros.errors import InputError, did_you_mean
 
 Value = float | int | str | bool
@@ -97,7 +98,7 @@ def _as_type(raw: object, like: Value) -> Value | None:
         return raw if isinstance(raw, bool) and isinstance(like, bool) else None
     if isinstance(like, str):
         return raw if isinstance(raw, str) else None
-    if not isinstance(raw, int | float) or not math.isfinite(raw):
+    if not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         return None
     if isinstance(like, int):
         return int(raw) if float(raw).is_integer() else None

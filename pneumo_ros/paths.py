@@ -5,27 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from pneumo_ros.errors import InputError
 
 PACKAGE = "pneumo_ros"
-
-
-@contextmanager
-def finished(path: Path) -> Iterator[Path]:
-    """A file that has its name only when it is complete: what is written to the path given here becomes ``path``.
-
-    It is ``<name>.part`` beside it, so that the change of name is one step; when writing fails nothing is left of it.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        yield part
-        part.replace(path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def share_file(*parts: str) -> Path:

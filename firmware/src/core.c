@@ -27,6 +27,7 @@ static void send_status(struct pneumo_core *core, uint32_t time) {
     memset(&record, 0, sizeof record);
     record.kind = PNEUMO_STATUS;
     struct pneumo_status *s = &record.as.status;
+    s->session = core->session;
     s->device_us = time;
     s->state = (uint8_t)core->state;
     s->fault = (uint8_t)core->fault;
@@ -47,6 +48,7 @@ static void send_hello(struct pneumo_core *core, uint32_t nonce) {
     record.kind = PNEUMO_HELLO;
     record.as.hello = core->identity;
     record.as.hello.nonce = nonce;
+    record.as.hello.session = core->session;
     record.as.hello.device_us = now(core);
     send(core, &record);
 }
@@ -65,12 +67,20 @@ static bool is_newer(const struct pneumo_core *core, uint32_t sequence) {
     return !core->has_sequence || (ahead != 0 && ahead < 0x80000000u);
 }
 
+/* What opens valves or ends a stop answers a sample of just now; what closes them may be of any age. */
+static bool is_fresh(const struct pneumo_core *core, const struct pneumo_command *command) {
+    if (!(command->flags & (PNEUMO_COMMAND_ARM | PNEUMO_COMMAND_RESET)))
+        return true;
+    uint64_t behind = (uint32_t)(core->sample_sequence - command->sample);
+    return behind * core->identity.sample_period_us <= core->identity.watchdog_us;
+}
+
 static bool acceptable(const struct pneumo_core *core, const struct pneumo_command *command) {
     uint32_t top = ((uint32_t)1 << core->identity.dac_bits) - 1u;
     for (int i = 0; i < PNEUMO_OUTPUTS; ++i)
         if (command->counts[i] > top)
             return false;
-    return is_newer(core, command->sequence);
+    return command->session == core->session && is_newer(core, command->sequence) && is_fresh(core, command);
 }
 
 static void when_safe(struct pneumo_core *core, const struct pneumo_command *command) {
@@ -125,6 +135,7 @@ static void on_command(struct pneumo_core *core, const struct pneumo_command *co
 static void on_hello_request(struct pneumo_core *core, const struct pneumo_hello_request *request) {
     if (core->state == PNEUMO_ARMED)
         leave_armed(core, PNEUMO_SAFE, PNEUMO_FAULT_HANDSHAKE);
+    core->session++;
     core->may_arm = false;
     core->has_sequence = false;
     core->command_sequence = 0;
@@ -146,6 +157,7 @@ void pneumo_core_boot(struct pneumo_core *core, const struct pneumo_hal *hal, co
     core->state = PNEUMO_SAFE;
     core->fault = PNEUMO_FAULT_NONE;
     set_safe_outputs(core);
+    core->session = identity->boot_id * PNEUMO_SESSION_SPREAD;
     core->status_us = now(core);
     send_hello(core, 0);
 }
@@ -182,6 +194,7 @@ static void send_sample(struct pneumo_core *core, uint32_t time, const int32_t c
     memset(&record, 0, sizeof record);
     record.kind = PNEUMO_SAMPLE;
     struct pneumo_sample *s = &record.as.sample;
+    s->session = core->session;
     s->sequence = core->sample_sequence++;
     s->device_us = time;
     s->state = (uint8_t)core->state;

@@ -6,7 +6,7 @@
 #define CRC 2u
 #define INPUT_SIZE 9u
 #define OUTPUT_SIZE 11u
-#define HELLO_FIXED 41u
+#define HELLO_FIXED 45u
 
 /* A cursor over little-endian bytes: the wire's layout never depends on the compiler's. */
 struct writer {
@@ -99,6 +99,7 @@ static int unstuff(const uint8_t *frame, size_t count, uint8_t *out) {
 static void put_hello(struct writer *w, const struct pneumo_hello *h) {
     put32(w, h->nonce);
     put32(w, h->boot_id);
+    put32(w, h->session);
     put32(w, h->device_us);
     put32(w, h->sample_period_us);
     put32(w, h->watchdog_us);
@@ -122,6 +123,7 @@ static void put_hello(struct writer *w, const struct pneumo_hello *h) {
 }
 
 static void put_sample(struct writer *w, const struct pneumo_sample *s) {
+    put32(w, s->session);
     put32(w, s->sequence);
     put32(w, s->device_us);
     put8(w, s->state);
@@ -131,13 +133,16 @@ static void put_sample(struct writer *w, const struct pneumo_sample *s) {
 }
 
 static void put_command(struct writer *w, const struct pneumo_command *c) {
+    put32(w, c->session);
     put32(w, c->sequence);
+    put32(w, c->sample);
     put8(w, c->flags);
     for (int i = 0; i < PNEUMO_OUTPUTS; ++i)
         put16(w, c->counts[i]);
 }
 
 static void put_status(struct writer *w, const struct pneumo_status *s) {
+    put32(w, s->session);
     put32(w, s->device_us);
     put8(w, s->state);
     put8(w, s->fault);
@@ -190,6 +195,7 @@ static int is_name(const char *name) {
 static enum pneumo_result get_hello(struct reader *r, struct pneumo_hello *h) {
     h->nonce = get32(r);
     h->boot_id = get32(r);
+    h->session = get32(r);
     h->device_us = get32(r);
     h->sample_period_us = get32(r);
     h->watchdog_us = get32(r);
@@ -215,6 +221,7 @@ static enum pneumo_result get_hello(struct reader *r, struct pneumo_hello *h) {
 }
 
 static enum pneumo_result get_sample(struct reader *r, struct pneumo_sample *s) {
+    s->session = get32(r);
     s->sequence = get32(r);
     s->device_us = get32(r);
     s->state = get8(r);
@@ -225,7 +232,9 @@ static enum pneumo_result get_sample(struct reader *r, struct pneumo_sample *s) 
 }
 
 static enum pneumo_result get_command(struct reader *r, struct pneumo_command *c) {
+    c->session = get32(r);
     c->sequence = get32(r);
+    c->sample = get32(r);
     c->flags = get8(r);
     for (int i = 0; i < PNEUMO_OUTPUTS; ++i)
         c->counts[i] = get16(r);
@@ -233,6 +242,7 @@ static enum pneumo_result get_command(struct reader *r, struct pneumo_command *c
 }
 
 static enum pneumo_result get_status(struct reader *r, struct pneumo_status *s) {
+    s->session = get32(r);
     s->device_us = get32(r);
     s->state = get8(r);
     s->fault = get8(r);
@@ -252,9 +262,9 @@ static size_t body_size(uint8_t kind) {
     switch (kind) {
     case PNEUMO_HELLO_REQUEST: return 4;
     case PNEUMO_HELLO: return HELLO_FIXED + PNEUMO_INPUTS * INPUT_SIZE + PNEUMO_OUTPUTS * OUTPUT_SIZE;
-    case PNEUMO_SAMPLE: return 10 + 4 * PNEUMO_INPUTS;
-    case PNEUMO_COMMAND: return 5 + 2 * PNEUMO_OUTPUTS;
-    case PNEUMO_STATUS: return 28 + 2 * PNEUMO_OUTPUTS;
+    case PNEUMO_SAMPLE: return 14 + 4 * PNEUMO_INPUTS;
+    case PNEUMO_COMMAND: return 13 + 2 * PNEUMO_OUTPUTS;
+    case PNEUMO_STATUS: return 32 + 2 * PNEUMO_OUTPUTS;
     default: return 0;
     }
 }

@@ -45,24 +45,24 @@ static int flatten(const struct pneumo_record *r, long long *out, char *name) {
         out[n++] = r->as.hello_request.nonce;
     } else if (r->kind == PNEUMO_SAMPLE) {
         const struct pneumo_sample *s = &r->as.sample;
-        out[n++] = s->sequence, out[n++] = s->device_us, out[n++] = s->state, out[n++] = s->flags;
+        out[n++] = s->session, out[n++] = s->sequence, out[n++] = s->device_us, out[n++] = s->state, out[n++] = s->flags;
         for (int i = 0; i < PNEUMO_INPUTS; ++i)
             out[n++] = s->counts[i];
     } else if (r->kind == PNEUMO_COMMAND) {
         const struct pneumo_command *c = &r->as.command;
-        out[n++] = c->sequence, out[n++] = c->flags;
+        out[n++] = c->session, out[n++] = c->sequence, out[n++] = c->sample, out[n++] = c->flags;
         for (int i = 0; i < PNEUMO_OUTPUTS; ++i)
             out[n++] = c->counts[i];
     } else if (r->kind == PNEUMO_STATUS) {
         const struct pneumo_status *s = &r->as.status;
-        out[n++] = s->device_us, out[n++] = s->state, out[n++] = s->fault, out[n++] = s->flags;
+        out[n++] = s->session, out[n++] = s->device_us, out[n++] = s->state, out[n++] = s->fault, out[n++] = s->flags;
         out[n++] = s->command_sequence, out[n++] = s->command_us, out[n++] = s->good_frames;
         out[n++] = s->bad_frames, out[n++] = s->refused_commands;
         for (int i = 0; i < PNEUMO_OUTPUTS; ++i)
             out[n++] = s->counts[i];
     } else {
         const struct pneumo_hello *h = &r->as.hello;
-        out[n++] = h->nonce, out[n++] = h->boot_id, out[n++] = h->device_us, out[n++] = h->sample_period_us;
+        out[n++] = h->nonce, out[n++] = h->boot_id, out[n++] = h->session, out[n++] = h->device_us, out[n++] = h->sample_period_us;
         out[n++] = h->watchdog_us;
         for (int i = 0; i < 3; ++i)
             out[n++] = h->firmware[i];

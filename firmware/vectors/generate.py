@@ -39,7 +39,7 @@ def wire(payload: bytes, crc: int | None = None) -> bytes:
     return stuff(payload + struct.pack("<H", value)) + b"\x00"
 
 
-def frame(kind: int, body: bytes, version: int = 1) -> bytes:
+def frame(kind: int, body: bytes, version: int = 2) -> bytes:
     return wire(bytes([version, kind]) + body)
 
 
@@ -55,26 +55,34 @@ IDENTITY = {
 }  # fmt: skip
 
 
-def hello(nonce: int, device_us: int, **changes: object) -> bytes:
+NEXT = (7 * 2_654_435_761 + 1) % 2**32  # after its first handshake
+SESSION = 7 * 2_654_435_761 % 2**32  # of a board of boot id 7 before its first handshake
+
+
+def hello(nonce: int, device_us: int, session: int = SESSION, **changes: object) -> bytes:
     h = {**IDENTITY, **changes}
     body = struct.pack(
-        "<5I5B16s", nonce, h["boot_id"], device_us, h["sample_period_us"], h["watchdog_us"], *h["firmware"],
+        "<6I5B16s", nonce, h["boot_id"], session, device_us, h["sample_period_us"], h["watchdog_us"], *h["firmware"],
         h["adc_bits"], h["dac_bits"], h["serial_number"].encode("latin-1"),
     )  # fmt: skip
     body += b"".join(struct.pack("<Bii", *entry) for entry in h["inputs"])
     return frame(HELLO, body + b"".join(struct.pack("<BiiH", *entry) for entry in h["outputs"]))
 
 
-def sample(sequence: int, device_us: int, state: int, flags: int, counts: tuple[int, ...]) -> bytes:
-    return frame(SAMPLE, struct.pack("<IIBB7i", sequence, device_us, state, flags, *counts))
+def sample(
+    sequence: int, device_us: int, state: int, flags: int, counts: tuple[int, ...], session: int = SESSION
+) -> bytes:
+    return frame(SAMPLE, struct.pack("<IIIBB7i", session, sequence, device_us, state, flags, *counts))
 
 
-def command(sequence: int, flags: int, counts: tuple[int, ...] = (0, 0, 0, 0)) -> bytes:
-    return frame(COMMAND, struct.pack("<IB4H", sequence, flags, *counts))
+def command(
+    sequence: int, flags: int, counts: tuple[int, ...] = (0, 0, 0, 0), session: int = SESSION, seen: int = 0
+) -> bytes:
+    return frame(COMMAND, struct.pack("<IIIB4H", session, sequence, seen, flags, *counts))
 
 
-def status(*fields: int) -> bytes:
-    return frame(STATUS, struct.pack("<IBBBIIIII4HB", *fields, 0))
+def status(*fields: int, session: int = SESSION) -> bytes:
+    return frame(STATUS, struct.pack("<IIBBBIIIII4HB", session, *fields, 0))
 
 
 def listed(value: object) -> str:
@@ -92,7 +100,13 @@ def good_frames() -> list[str]:
         (9, 0xFFFFFFFF, {"serial_number": "0123456789ABCDEF", "adc_bits": 24, "dac_bits": 16}),
         (1, 5, {"serial_number": "", "inputs": tuple((c, -(2**31), 2**31 - 1) for c in range(7))}),
     ):
-        h = {"nonce": nonce, "boot_id": 7, "device_us": time, **{k: v for k, v in IDENTITY.items() if k != "boot_id"}}
+        h = {
+            "nonce": nonce,
+            "boot_id": 7,
+            "session": SESSION,
+            "device_us": time,
+            **{k: v for k, v in IDENTITY.items() if k != "boot_id"},
+        }
         h.update(changes)
         flat = {**h, "inputs": sum(h["inputs"], ()), "outputs": sum(h["outputs"], ())}
         lines.append(good(hello(nonce, time, **changes), HELLO, **flat))
@@ -102,19 +116,21 @@ def good_frames() -> list[str]:
         (0x00010000, 65536, 1, 1, (0, 255, 0, 256, 0, 65536, 0)),
     ):
         names = dict(zip(("sequence", "device_us", "state", "flags", "counts"), fields, strict=True))
-        lines.append(good(sample(*fields), SAMPLE, **names))
+        lines.append(good(sample(*fields, session=fields[0] ^ 5), SAMPLE, session=fields[0] ^ 5, **names))
     for fields in ((1, 0, (0, 0, 0, 0)), (0x80000000, ARM, (1, 256, 4095, 65535)), (0, 7, (0, 0, 0, 1))):
-        lines.append(good(command(*fields), COMMAND, sequence=fields[0], flags=fields[1], counts=fields[2]))
+        own = {"session": 2**32 - 1 - fields[0], "sequence": fields[0], "sample": fields[0] // 3}
+        data = command(*fields, session=own["session"], seen=own["sample"])
+        lines.append(good(data, COMMAND, **own, flags=fields[1], counts=fields[2]))
     for fields in ((0,) * 13, (1, 2, 6, 3, 5, 6, 7, 8, 9, 10, 11, 12, 0xFFFF)):
         names = ("device_us", "state", "fault", "flags", "command_sequence", "command_us", "good_frames",
                  "bad_frames", "refused_commands")  # fmt: skip
         named = dict(zip(names, fields[:9], strict=True))
-        lines.append(good(status(*fields), STATUS, **named, counts=fields[9:]))
+        lines.append(good(status(*fields), STATUS, session=SESSION, **named, counts=fields[9:]))
     return lines
 
 
 def bad_frames() -> list[str]:
-    payload = bytes([1, COMMAND]) + struct.pack("<IB4H", 5, ARM, 1, 2, 3, 4)
+    payload = bytes([2, COMMAND]) + struct.pack("<IIIB4H", SESSION, 5, 0, ARM, 1, 2, 3, 4)
     right = binascii.crc_hqx(payload, 0xFFFF)
     cut = command(5, ARM, (1, 2, 3, 4))
     cases = [
@@ -128,7 +144,7 @@ def bad_frames() -> list[str]:
         (wire(payload, right ^ 0x8000), "crc"),
         (wire(payload, (right >> 8) | (right & 0xFF) << 8), "crc"),
         (cut[:-3] + b"\x00", "cobs"),
-        (frame(COMMAND, payload[2:], version=2), "version"),
+        (frame(COMMAND, payload[2:], version=1), "version"),
         (frame(COMMAND, payload[2:], version=0), "version"),
         (frame(0x21, payload[2:]), "kind"),
         (frame(0x00, b""), "kind"),
@@ -141,7 +157,7 @@ def bad_frames() -> list[str]:
         (sample(1, 1, 0, 4, (0,) * 7), "value"),
         (status(1, 3, 0, 0, *(0,) * 9), "value"),
         (status(1, 0, 7, 0, *(0,) * 9), "value"),
-        (frame(STATUS, bytes(35) + b"\x01"), "value"),
+        (frame(STATUS, bytes(39) + b"\x01"), "value"),
         (hello(1, 1, adc_bits=7), "value"),
         (hello(1, 1, adc_bits=33), "value"),
         (hello(1, 1, dac_bits=17), "value"),
@@ -173,13 +189,15 @@ def boot_cases() -> list[str]:
         f"sent {hello(0, 0).hex()}",
         expect(SAFE, NONE, SAFE_OUT, 0),
         rx(50, hello_request(0xABCD)),
-        f"sent {hello(0xABCD, 50).hex()}",
+        f"sent {hello(0xABCD, 50, NEXT).hex()}",
         "tick 1000",
-        f"sent {sample(0, 1000, 0, 0, COUNTS).hex()}",
+        f"sent {sample(0, 1000, 0, 0, COUNTS, NEXT).hex()}",
         "tick 2000 fail",
-        f"sent {sample(1, 2000, 0, 2, (0,) * 7).hex()}",
+        f"sent {sample(1, 2000, 0, 2, (0,) * 7, NEXT).hex()}",
         "tick 100000",
-        "sent " + (sample(2, 100000, 0, 0, COUNTS) + status(100000, 0, 0, 0, 0, 0, 1, 0, 0, *SAFE_OUT)).hex(),
+        "sent "
+        + sample(2, 100000, 0, 0, COUNTS, NEXT).hex()
+        + status(100000, 0, 0, 0, 0, 0, 1, 0, 0, *SAFE_OUT, session=NEXT).hex(),
     ]
 
 
@@ -205,8 +223,35 @@ def arming_cases() -> list[str]:
         expect(ARMED, NONE, OPEN, 2),
         rx(200, hello_request(3)),
         expect(SAFE, HANDSHAKE, SAFE_OUT, 3),
-        rx(300, command(1, 0), command(2, ARM, OPEN)),
+        rx(300, command(1, 0, session=NEXT), command(2, ARM, OPEN, NEXT)),
         expect(ARMED, HANDSHAKE, OPEN, 5),
+        "case frames of the session before, or of none, do nothing",
+        *arm(),
+        rx(200, hello_request(3)),
+        rx(300, command(3, 0), command(4, ARM, OPEN), command(5, 0, session=0), command(6, ARM, OPEN, 0)),
+        expect(SAFE, HANDSHAKE, SAFE_OUT, 7, 0, 4),
+        rx(301, hello_request(3)),
+        rx(302, command(1, 0, session=NEXT), command(2, ARM, OPEN, NEXT), command(7, RESET, session=NEXT)),
+        expect(SAFE, HANDSHAKE, SAFE_OUT, 11, 0, 7),
+        rx(303, command(3, ESTOP, session=NEXT)),
+        expect(SAFE, HANDSHAKE, SAFE_OUT, 12, 0, 8),
+        "case what opens valves answers a sample of just now; what closes them may be late",
+        *(f"tick {1000 * k}" for k in range(1, 51)),
+        rx(50100, command(1, 0)),
+        rx(50200, command(2, ARM, OPEN, seen=9)),
+        expect(SAFE, NONE, SAFE_OUT, 2, 0, 1),
+        rx(50300, command(3, ARM, OPEN, seen=51)),
+        expect(SAFE, NONE, SAFE_OUT, 3, 0, 2),
+        rx(50400, command(4, ARM, OPEN, seen=10)),
+        expect(ARMED, NONE, OPEN, 4, 0, 2),
+        rx(50500, command(5, ARM, (1, 1, 1, 1), seen=0)),
+        expect(ARMED, NONE, OPEN, 5, 0, 3),
+        rx(50600, command(6, ESTOP, seen=0)),
+        expect(STOPPED, ESTOP_COMMAND, SAFE_OUT, 6, 0, 3),
+        rx(50700, command(7, RESET, seen=9)),
+        expect(STOPPED, ESTOP_COMMAND, SAFE_OUT, 7, 0, 4),
+        rx(50800, command(8, RESET, seen=50)),
+        expect(SAFE, ESTOP_COMMAND, SAFE_OUT, 8, 0, 4),
     ]
 
 
@@ -254,11 +299,11 @@ def estop_cases() -> list[str]:
         expect(STOPPED, ESTOP_COMMAND, SAFE_OUT, 7),
         rx(350, hello_request(5)),
         expect(STOPPED, ESTOP_COMMAND, SAFE_OUT, 8),
-        rx(400, command(8, RESET)),
+        rx(400, command(8, RESET, session=NEXT)),
         expect(SAFE, ESTOP_COMMAND, SAFE_OUT, 9),
-        rx(500, command(9, ARM, OPEN)),
+        rx(500, command(9, ARM, OPEN, NEXT)),
         expect(SAFE, ESTOP_COMMAND, SAFE_OUT, 10),
-        rx(600, command(10, 0), command(11, ARM, OPEN)),
+        rx(600, command(10, 0, session=NEXT), command(11, ARM, OPEN, NEXT)),
         expect(ARMED, ESTOP_COMMAND, OPEN, 12),
         "case e-stop by the input needs its release before RESET works",
         *arm(),

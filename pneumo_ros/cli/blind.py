@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:

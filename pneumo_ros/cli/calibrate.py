@@ -11,8 +11,7 @@ import typer
 from pneumo_ros.cli.existing import Overwrite, refuse_existing
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.daq.calibration_fit import Fit
 
 
@@ -122,7 +121,7 @@ def _check(name: str, adc_bits: int, adc_range: float) -> None:
 
 
 def _console() -> Console:
-    from rich.console import Console
+    from pneumo_ros.cli.terminal import Console
 
     return Console()
 

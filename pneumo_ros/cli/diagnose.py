@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
 from pneumo_ros.cli.rig_notes import tell_assumed
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def diagnose(
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
-        files.append(save_corrected_rig(found, task.model, save_rig, effect or ()))
+        files.append(save_corrected_rig(found, task.model, save_rig))
     _show(console, found, {name: effect.summary for name, effect in task.model.library.items()}, task.fit)
     if found.experiment is not None:
         console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)

@@ -6,10 +6,9 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from rich.console import Console
-
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
-from pneumo_ros.paths import finished
+from pneumo_ros.files import new_file
 from pneumo_ros.thesis.bench_tables import Judged, TableDiagnosis, diagnose_tables
 
 TITLES = {
@@ -61,7 +60,7 @@ def _write(folder: Path, found: Mapping[str, TableDiagnosis]) -> Path:
     path = folder / FILE
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with finished(path) as part:
+        with new_file(path) as part:
             part.write_text(json.dumps({name: one.to_json() for name, one in found.items()}, indent=1) + "\n")
     except OSError as error:
         raise InputError(

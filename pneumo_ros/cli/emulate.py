@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.parameters import Value
     from pneumo_ros.rig import Rig
     from pneumo_ros.road import Road
@@ -40,9 +39,8 @@ def emulate(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing.")] = False,
 ) -> None:  # fmt: skip
     """Emulate the rig on a pseudo-terminal: plant in real time, converters, valves, watchdog, and faults."""
-    from rich.console import Console
-
     from pneumo_ros.cli.choices import check_road
+    from pneumo_ros.cli.terminal import Console
     from pneumo_ros.daq.emulator.faults import parse_fault
 
     console = Console(quiet=quiet, highlight=False)
@@ -78,6 +76,11 @@ def emulate(
     prefer_this_process()
     freeze_startup_objects()
     if the_rig.effects:
+        from pneumo_ros.effects.configured import library_of
+        from pneumo_ros.effects.loading import origins
+
+        for text in origins(library_of(the_rig)):
+            console.print(text, soft_wrap=True)
         console.print("with its effects: " + ", ".join(one.label for one in the_rig.effects), soft_wrap=True)
     console.print(f"emulating the rig on {link}; Ctrl-C ends it; try", soft_wrap=True)
     console.print(f"  pneumo run --source serial --port {link} --calibration {calibration}", soft_wrap=True)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
     from pneumo_ros.log.comparison import Comparison
@@ -132,15 +133,19 @@ def report(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Page to write (.html); beside the log by default.")
     ] = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="Rig file (YAML), where the log's rig names an effect of your own.")
+    ] = None,
 ) -> None:
     """One HTML page: summary, pictures, timing, trips, parameters, versions, conformance."""
     from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.log.reading import read_log
+    from pneumo_ros.rig import load_rig
     from pneumo_ros.session.report import write_report
     from pneumo_ros.session.summary import load_session
 
     target = output or log.with_suffix(".html")
-    write_report(read_log(log), target, passive_run(load_session(log)))
+    write_report(read_log(log), target, passive_run(load_session(log), None if rig is None else load_rig(rig)))
     console.print(f"report   {target}", highlight=False, soft_wrap=True)
 
 

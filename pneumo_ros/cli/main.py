@@ -108,12 +108,31 @@ def _show_version(wanted: bool) -> None:
 @app.callback()
 def root(
     version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")] = False,
+    max_chunk: Annotated[
+        int | None,
+        typer.Option(help="Largest chunk of a log that is unpacked, MiB; 256 by default.", min=1, max=4096),
+    ] = None,
 ) -> None:
     """Active pneumatic half-car rig: run, log, replay, and diagnose the sim-to-real gap."""
+    if max_chunk is not None:
+        from pneumo_ros.log.bounds import set_chunk_limit
+
+        set_chunk_limit(max_chunk)
+
+
+def _trust_no_working_folder() -> None:
+    """A folder of logs from elsewhere may hold anything: neither modules nor settings of compilers are taken from it.
+
+    Numba reads ``.numba_config.yaml`` of the working folder and would load compiled code from where that says; what
+    the environment names comes first. ``python -m`` looks for modules in the working folder unless told not to.
+    """
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
 
 
 def main() -> None:
     """Entry point: a mistake of the user is one line on standard error and exit code 2."""
+    _trust_no_working_folder()
     try:
         app()
     except PneumoError as error:

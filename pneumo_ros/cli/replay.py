@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich import box
-from rich.console import Console
 from rich.table import Table
 
 from pneumo_ros.cli.rig_notes import tell_assumed
+from pneumo_ros.cli.terminal import Console
+from pneumo_ros.documents import parse_json
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,6 +27,16 @@ if TYPE_CHECKING:
 app = typer.Typer(add_completion=False)
 console = Console()
 DIFFERS = 1
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the user puts in place of what the log says: parameters, rig file, effects' files, valve profile."""
+
+    overrides: Mapping[str, Mapping[str, Any]]
+    rig: Path | None
+    effects: tuple[Path, ...]
+    valves: Path | None
 
 
 @app.command()
@@ -56,6 +66,16 @@ def replay(
             help="Rig file (YAML) in place of the log's: --closed-loop runs it with its effects, --stepped believes it."
         ),
     ] = None,
+    effect: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Python file with an effect that the log's rig names, repeatable; a log's own path is not used."
+        ),
+    ] = None,
+    valves: Annotated[
+        Path | None,
+        typer.Option(help="Valve profile that the session played; the path that a log names is never opened."),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write the log with the replayed topics in place (.mcap).")
     ] = None,
@@ -81,9 +101,10 @@ def replay(
                              remedy="leave out --closed-loop, --stepped, --set and --diagnosis")  # fmt: skip
         _open_loop(found, rig, plot)
     elif closed_loop or diagnosis is not None:
-        _closed_loop(found, parse_overrides(set_), diagnosis, rig, plot)
+        given = Given(parse_overrides(set_), rig, tuple(effect or ()), valves)
+        _closed_loop(found, given, diagnosis, plot)
     elif stepped or set_:
-        _stepped(found, parse_overrides(set_), _believed(found, rig), output, plot)
+        _stepped(found, Given(parse_overrides(set_), rig, (), valves), output, plot)
     else:
         if rig is not None:
             raise InputError("a live replay publishes what was recorded and simulates no rig", where="--rig",
@@ -125,18 +146,17 @@ def _believed(log: Log, path: Path | None) -> Rig | None:
     return rig
 
 
-def _stepped(
-    log: Log, overrides: Mapping[str, Mapping[str, Any]], rig: Rig | None, output: Path | None, plot: Path | None
-) -> None:
+def _stepped(log: Log, given: Given, output: Path | None, plot: Path | None) -> None:
     from pneumo_ros.log.rewriting import refuse_target, write_log
     from pneumo_ros.session.replay import replay as step
     from pneumo_ros.session.replay import replayed_log, warm_up
 
+    overrides, rig = given.overrides, _believed(log, given.rig)
     if output is not None:
         refuse_target(output, log.path)
     warm_up(log)
     begin = time.perf_counter()
-    result = step(log, overrides, rig)
+    result = step(log, overrides, rig, given.valves)
     took = time.perf_counter() - begin
     _show_run(result, took)
     if overrides:
@@ -208,12 +228,10 @@ def _draw(result: Replayed, path: Path, title: str) -> None:
     console.print(f"picture  {path}", highlight=False, soft_wrap=True)
 
 
-def _closed_loop(
-    log: Log, overrides: Mapping[str, Mapping[str, Any]], diagnosis: Path | None, rig: Path | None, plot: Path | None
-) -> None:
+def _closed_loop(log: Log, given: Given, diagnosis: Path | None, plot: Path | None) -> None:
     from pneumo_ros.session.rerun import draw_rerun
 
-    result = _again(log, overrides, rig) if diagnosis is None else _diagnosed(log, overrides, diagnosis, rig)
+    result = _again(log, given) if diagnosis is None else _diagnosed(log, given, diagnosis)
     for note in result.notes:
         console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
     console.print(rerun_table(result))
@@ -241,32 +259,42 @@ def _open_loop(log: Log, path: Path | None, plot: Path | None) -> None:
         console.print(f"picture  {plot}", highlight=False, soft_wrap=True)
 
 
-def _again(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path | None) -> Rerun:
+def _again(log: Log, given: Given) -> Rerun:
     """From rest, on the log's rig or the given one, with its effects if it has any."""
+    from pneumo_ros.effects.configured import library_of, with_files
+    from pneumo_ros.effects.loading import origins
     from pneumo_ros.effects.stepping import stepped_rig
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.rerun import rerun
 
-    rig = log.config if path is None else load_rig(path)
-    return rerun(log, overrides, rig, stepped_rig if rig is not None and rig.diagnosed else None)
+    rig = log.config if given.rig is None else load_rig(given.rig)
+    if rig is not None and rig.effects:
+        rig = with_files(rig, given.effects)
+        for text in origins(library_of(rig)):
+            console.print(text, highlight=False, soft_wrap=True)
+    build = stepped_rig if rig is not None and rig.diagnosed else None
+    return rerun(log, given.overrides, rig, build, given.valves)
 
 
-def _diagnosed(log: Log, overrides: Mapping[str, Mapping[str, Any]], path: Path, rig: Path | None) -> Rerun:
-    """On the rig as diagnosed; ``rig`` is the one that the diagnosis was told, if it was told one."""
+def _diagnosed(log: Log, given: Given, path: Path) -> Rerun:
+    """On the rig as diagnosed; the rig given is the one that the diagnosis was told, if it was told one."""
     from pneumo_ros.diagnosis.half_car.closed_loop import rerun_diagnosed
     from pneumo_ros.diagnosis.signals import read_signals
+    from pneumo_ros.effects.configured import with_files
     from pneumo_ros.log.inspection import read_setups, seed_of
     from pneumo_ros.rig import load_rig
     from pneumo_ros.session.replay import plan
 
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        document = parse_json(path.read_text(encoding="utf-8"), path)
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the diagnosis ({error})", where=path, remedy="give diagnosis.json") from error
     setups, notes = list(read_setups(log)), list[str]()
-    values = [plan(setups, node, overrides.get(node, {}), notes).start for node in ("estimator", "controller")]
+    nodes = ("estimator", "controller")
+    values = [plan(setups, node, given.overrides.get(node, {}), notes, given.valves).start for node in nodes]
     seed = int(seed_of(log).get("plant", 0))
-    signals = read_signals(log.path, None if rig is None else load_rig(rig))
+    signals = read_signals(log.path, None if given.rig is None else load_rig(given.rig))
+    signals = replace(signals, rig=with_files(signals.rig, given.effects))
     result = rerun_diagnosed(signals, document, values[0], values[1], seed)
     return replace(result, notes=(*result.notes, *notes))
 

@@ -16,8 +16,8 @@ import numpy as np
 import rclpy
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
-from rich.console import Console
 
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.log.reading import Log
 from pneumo_ros.nodes.replay import Player, spinning, transport_of
 from pneumo_ros.nodes.spin import SignalStop

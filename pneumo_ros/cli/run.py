@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from pneumo_ros.cli.choices import ALIASES, DEFAULT_CONTROLLER, ROAD_CLASSES, check_controller, check_road
 from pneumo_ros.cli.rig_notes import tell_assumed
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError, not_one_of
 
 if TYPE_CHECKING:
@@ -195,6 +195,11 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
 
 def _tell_effects(console: Console, rig: Rig, source: str) -> None:
     """Who acts on the rig's effects: the simulated rig does, the hardware has its own."""
+    from pneumo_ros.effects.configured import library_of
+    from pneumo_ros.effects.loading import origins
+
+    for text in origins(library_of(rig)):
+        console.print(text, soft_wrap=True)
     names = ", ".join(one.label for one in rig.effects)
     if source == "serial":
         console.print(f"not simulated, for the hardware has its own: {names}; the log's rig names them", soft_wrap=True)
@@ -353,11 +358,13 @@ def _report(console: Console, target: Path, values: Values, picture: bool, page:
     from pneumo_ros.cli.passive import passive_run
     from pneumo_ros.cli.tables import summary_table, timing_table
     from pneumo_ros.log.reading import read_log
+    from pneumo_ros.rig import load_rig
     from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
     from pneumo_ros.session.warnings import warnings_of
 
     session = load_session(target)
-    other = passive_run(session)
+    own = load_rig(str(values["road_profile"].get("rig", "")) or None)
+    other = passive_run(session, own)
     loop = loop_timing(target)
     ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
     theirs = summarise(other) if other is not None else None

@@ -13,17 +13,18 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
 app = typer.Typer(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
 console = Console()
+NICE = 10  # drawing for browsers gives way to the nodes that run beside it
 END_PATIENCE = 5.0  # s a dashboard has to close its connections
 
-Host = Annotated[str, typer.Option(help="Address to serve on; anything but this computer needs the token it prints.")]
+Host = Annotated[str, typer.Option(help="Address to serve on; other computers reach it only if you name one.")]
 Port = Annotated[int, typer.Option(help="Port; 0 takes a free one.", min=0, max=65535)]
-Token = Annotated[str | None, typer.Option(help="Ask every viewer for this token; one is made for other addresses.")]
+Token = Annotated[str | None, typer.Option(help="Ask every viewer for this token; one is made if you give none.")]
 
 
 @app.command()
@@ -77,6 +78,7 @@ def view_live(host: str, port: int, token: str | None, domain_id: int | None) ->
     from pneumo_ros.dashboard.server import serve
     from pneumo_ros.nodes.dashboard_link import LiveLink
 
+    os.nice(NICE)
     with LiveLink(domain_id) as link:
         dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)
         console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)

@@ -62,6 +62,8 @@ class Actuation:
         self.sent_ns: deque[tuple[int, int]] = deque(maxlen=SENT_KEPT)
         self.areas = safety.safe_command
         self.applied: deque[Applied] = deque(maxlen=APPLIED_KEPT)
+        self.session = 0
+        self.sample = 0  # one more than the latest SAMPLE's sequence
         self._sequence = 0
         self._last_send = 0
         self._quick_until = 0
@@ -70,10 +72,10 @@ class Actuation:
         self._last_command = 0
         self._last_stamp = 0
 
-    def board(self, scale: OutputScale | None) -> None:
+    def board(self, scale: OutputScale | None, session: int = 0) -> None:
         """A board has answered (None: it is gone); the sequence starts again, SAFE unless ESTOP."""
-        self.scale = scale
-        self._sequence = 0
+        self.scale, self.session = scale, session
+        self._sequence = self.sample = 0
         self.sent_ns.clear()
         if self.mode is not Mode.ESTOP:
             self.mode = Mode.ESTOP if self.mode is Mode.RESETTING else Mode.SAFE
@@ -195,7 +197,7 @@ class Actuation:
         self._sequence = (self._sequence + 1) % WRAP
         self.areas = tuple(areas)
         self.applied.append(Applied(now, self.areas))
-        self._send(encode(Command(self._sequence, flags, self.scale.counts(areas))))
+        self._send(encode(Command(self.session, self._sequence, self.sample, flags, self.scale.counts(areas))))
         self.sent += 1
         self.sent_ns.append((self._sequence, now))
         self._last_send = now

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from datetime import date
 from pathlib import Path
@@ -19,8 +18,10 @@ from pneumo_ros.daq.calibration import (
     ValveCalibration,
     units_of,
 )
+from pneumo_ros.documents import LARGEST, parse_yaml
 from pneumo_ros.errors import InputError
-from pneumo_ros.paths import finished, share_file
+from pneumo_ros.files import new_file
+from pneumo_ros.paths import share_file
 from pneumo_ros.rig.channels import VALVES
 
 SENSOR_KEYS = ("gain", "offset", "unit", "zero", "date", "residual", "interval", "source")
@@ -67,13 +68,7 @@ def load_calibration(name: str | Path | None = None) -> Calibration:
 
 def parse_calibration(text: str, where: str) -> Calibration:
     """Read a calibration from YAML text; ``where`` names it in errors."""
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
-    root = _mapping(document, "calibration", where)
+    root = _mapping(parse_yaml(text, where), "calibration", where)
     sensors = _entries(root, "sensors", SENSORS, where)
     valves = _entries(root, "valves", VALVES, where)
     return Calibration(
@@ -93,7 +88,7 @@ def calibration_to_yaml(calibration: Calibration) -> str:
 
 def save_calibration(calibration: Calibration, path: str | Path) -> None:
     """Write the YAML form; the name appears only when the file is complete."""
-    with finished(Path(path)) as part:
+    with new_file(Path(path)) as part:
         part.write_text(calibration_to_yaml(calibration), encoding="utf-8")
 
 
@@ -124,7 +119,7 @@ def _checked(name: str, entry: object, keys: tuple[str, ...], units: Mapping[str
     for key in ("gain", "offset", "unit"):
         if key not in entry:
             raise InputError("key missing", where=where, key=f"{name}.{key}", remedy="add it")
-    if entry["unit"] not in units:
+    if str(entry["unit"]) not in units:
         raise InputError("unknown unit", where=where, key=f"{name}.unit", value=entry["unit"], allowed=", ".join(units))
     out = dict(entry)
     for key in ("gain", "offset", "zero", "residual", "interval"):
@@ -149,6 +144,6 @@ def _valve(name: str, entry: object, where: str) -> ValveCalibration:
 
 
 def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError("not a finite number", where=where, key=key, value=raw, allowed="a finite number")
     return float(raw)

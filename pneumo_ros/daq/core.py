@@ -6,17 +6,18 @@ All times are monotonic, ns.
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Callable, Sequence
 from enum import Enum
 
-from pneumo_ros.daq.actuation import SECOND, Actuation, Applied, Mode
+from pneumo_ros.daq.actuation import SECOND, WRAP, Actuation, Applied, Mode
 from pneumo_ros.daq.admission import admit
 from pneumo_ros.daq.calibration import Calibration
 from pneumo_ros.daq.calibration_check import check_calibration
 from pneumo_ros.daq.clock import DeviceClock
 from pneumo_ros.daq.findings import Findings
 from pneumo_ros.daq.frames import DeviceFault, DeviceState, Hello, HelloRequest, Sample, SampleFlag, Status, encode
-from pneumo_ros.daq.intake import Intake, Measurement
+from pneumo_ros.daq.intake import MISFITS, Intake, Measurement
 from pneumo_ros.daq.reasons import Event, Finding, Level, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.daq.stream import StreamDecoder
@@ -51,6 +52,7 @@ class DriverCore:
     safety, calibration, rig : configuration
     send : writes bytes to the port without blocking
     discard : throws away bytes that have not left the host yet
+    draw : the handshakes' nonces; another in each session, so that no answer recorded before fits
     """
 
     def __init__(
@@ -60,6 +62,7 @@ class DriverCore:
         rig: Rig,
         send: Callable[[bytes], None],
         discard: Callable[[], None] = lambda: None,
+        draw: Callable[[], int] = lambda: secrets.randbits(32),
     ) -> None:
         self.safety, self.calibration, self.rig = safety, calibration, rig
         self._surface = load_surface()
@@ -75,6 +78,10 @@ class DriverCore:
         self._send = send
         self._out: list[Measurement | Event] = []
         self._nonce = 0
+        self._draw = draw
+        self.foreign = 0  # frames of another session, dropped
+        self._last_stray = -COMPLAINT_EVERY
+        self._strays = 0  # samples of another session since the last own one
         self._last_hello = 0
         self._last_sample = 0
         self._silent = False
@@ -146,10 +153,18 @@ class DriverCore:
         self.phase = Phase.HANDSHAKE
         self.actuation.board(None)
         self._last_hello = now
-        self._nonce = self._nonce % 0xFFFFFFFF + 1
+        # Unguessable: the answer to a handshake of another session must not pass for the answer to this one.
+        self._nonce = self._draw() % 0xFFFFFFFF + 1
         self._send(encode(HelloRequest(self._nonce)))
 
     def _on_hello(self, hello: Hello, now: int) -> None:
+        if self.phase is Phase.RUNNING and hello.nonce not in (0, self._nonce):
+            self.foreign += 1
+            self._lose(Finding(Reason.LINK_SHARED, "board", "it answers another host, or an old frame came again"), now)
+            # Not at once: two hosts that take the board from each other must not flood the line.
+            self.phase, self._last_hello = Phase.HANDSHAKE, now
+            self.actuation.board(None)
+            return
         known = self.intake.hello.boot_id if self.intake else hello.boot_id
         if hello.boot_id != known and self.phase is Phase.RUNNING:
             self._lose(Finding(Reason.BOARD_RESET, "board", f"boot {known} became {hello.boot_id}"), now)
@@ -169,9 +184,9 @@ class DriverCore:
         self.intake = Intake(
             hello, self.calibration, self.safety, self.rig, self._surface, self._known_clock(hello, now)
         )
-        self.actuation.board(scale)
+        self.actuation.board(scale, hello.session)
         self.phase, self.status, self.last = Phase.RUNNING, None, None
-        self._last_sample, self._silent = now, False
+        self._last_sample, self._silent, self._strays = now, False, 0
         self._window = (now, 0, 0)
         self.findings.reset(now)
         firmware = ".".join(map(str, hello.firmware))
@@ -203,9 +218,19 @@ class DriverCore:
     def _on_sample(self, sample: Sample, now: int) -> None:
         if self.phase is not Phase.RUNNING or self.intake is None:
             return
+        if sample.session != self.intake.hello.session:
+            self._stray(now)
+            self._strays += 1
+            if self._strays >= MISFITS:  # and none of its own in between: the board has restarted unheard
+                self._lose(Finding(Reason.BOARD_RESET, "board", "it is in another session"), now)
+                self._shake_hands(now)
+            return
+        before = self.intake.out_of_step
         measurement, found = self.intake.take(sample, now)
-        self._last_sample, self._silent = now, False
-        self._follow_board(sample, now)
+        if self.intake.out_of_step == before:  # one that came again, or late, is no sign of life
+            self._last_sample, self._silent, self._strays = now, False, 0
+            self.actuation.sample = (sample.sequence + 1) % WRAP
+            self._follow_board(sample, now)
         if self.intake.recent_loss > self.safety.plausibility.lost_at_once:
             text = f"{self.intake.recent_loss:.0%} of the last frames lost"
             found.append(Finding(Reason.FRAMES_LOST, "link", text))
@@ -244,13 +269,26 @@ class DriverCore:
         return Finding(reason, "board", f"the board went safe by itself: {fault.name.lower()}")
 
     def _on_status(self, status: Status, now: int) -> None:
-        self.status = status
         if self.intake is None or self.phase is not Phase.RUNNING:
             return
+        if status.session != self.intake.hello.session:
+            self._stray(now)
+            return
+        if self.status is not None and (status.device_us - self.status.device_us) % WRAP >= WRAP // 2:
+            return  # an older one that came late
+        self.status = status
         for sequence, sent in self.actuation.sent_ns:
             if sequence == status.command_sequence:
                 self.intake.clock.add_receipt(status.command_us, sent)
                 return
+
+    def _stray(self, now: int) -> None:
+        """A frame of another session: old, or somebody else's. It is dropped, and said once a second."""
+        self.foreign += 1
+        if now - self._last_stray >= COMPLAINT_EVERY:
+            self._last_stray = now
+            text = f"{self.foreign} frames of another session dropped so far"
+            self._finding_event(Finding(Reason.LINK_SHARED, "link", text, Level.WARN), now)
 
     def _watch_samples(self, now: int) -> None:
         silence = now - self._last_sample

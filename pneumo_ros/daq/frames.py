@@ -13,7 +13,7 @@ from typing import NamedTuple
 from cobs import cobs
 from fastcrc import crc16
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
 MAX_FRAME = 254  # bytes before the delimiter
 DELIMITER = b"\x00"
 INPUT_COUNT = 7
@@ -135,6 +135,7 @@ class Hello(NamedTuple):
 
     nonce: int
     boot_id: int
+    session: int
     device_us: int
     sample_period_us: int
     watchdog_us: int
@@ -149,6 +150,7 @@ class Hello(NamedTuple):
 class Sample(NamedTuple):
     """One conversion of all inputs; ``counts`` in the order of HELLO's inputs."""
 
+    session: int
     sequence: int
     device_us: int
     state: DeviceState
@@ -157,9 +159,15 @@ class Sample(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What the valves shall do; ``counts`` in the order of HELLO's outputs."""
+    """What the valves shall do; ``counts`` in the order of HELLO's outputs.
 
+    ``sample`` is one more than the sequence of the latest SAMPLE the host had: the board tells by it how old a command
+    is, whatever held it up.
+    """
+
+    session: int
     sequence: int
+    sample: int
     flags: CommandFlag
     counts: tuple[int, ...]
 
@@ -167,6 +175,7 @@ class Command(NamedTuple):
 class Status(NamedTuple):
     """The device's state, why, and its counters."""
 
+    session: int
     device_us: int
     state: DeviceState
     fault: DeviceFault
@@ -184,12 +193,12 @@ Record = HelloRequest | Hello | Sample | Command | Status
 _HEADER = struct.Struct("<BB")
 _CRC = struct.Struct("<H")
 _HELLO_REQUEST = struct.Struct("<I")
-_HELLO_FIXED = struct.Struct("<IIIII5B16s")
+_HELLO_FIXED = struct.Struct("<IIIIII5B16s")
 _INPUT = struct.Struct("<Bii")
 _OUTPUT = struct.Struct("<BiiH")
-_SAMPLE = struct.Struct(f"<IIBB{INPUT_COUNT}i")
-_COMMAND = struct.Struct(f"<IB{OUTPUT_COUNT}H")
-_STATUS = struct.Struct(f"<IBBBIIIII{OUTPUT_COUNT}HB")
+_SAMPLE = struct.Struct(f"<IIIBB{INPUT_COUNT}i")
+_COMMAND = struct.Struct(f"<IIIB{OUTPUT_COUNT}H")
+_STATUS = struct.Struct(f"<IIBBBIIIII{OUTPUT_COUNT}HB")
 _HELLO_SIZE = _HELLO_FIXED.size + INPUT_COUNT * _INPUT.size + OUTPUT_COUNT * _OUTPUT.size
 
 BODY_SIZE = {
@@ -254,11 +263,11 @@ def _unstuffed(frame: bytes) -> bytes:
 
 def _body(record: Record) -> tuple[Kind, bytes]:
     if isinstance(record, Sample):
-        return Kind.SAMPLE, _SAMPLE.pack(*record[:4], *record.counts)
+        return Kind.SAMPLE, _SAMPLE.pack(*record[:5], *record.counts)
     if isinstance(record, Command):
-        return Kind.COMMAND, _COMMAND.pack(*record[:2], *record.counts)
+        return Kind.COMMAND, _COMMAND.pack(*record[:4], *record.counts)
     if isinstance(record, Status):
-        return Kind.STATUS, _STATUS.pack(*record[:9], *record.counts, 0)
+        return Kind.STATUS, _STATUS.pack(*record[:10], *record.counts, 0)
     if isinstance(record, HelloRequest):
         return Kind.HELLO_REQUEST, _HELLO_REQUEST.pack(record.nonce)
     return Kind.HELLO, _hello_body(record)
@@ -266,7 +275,7 @@ def _body(record: Record) -> tuple[Kind, bytes]:
 
 def _hello_body(hello: Hello) -> bytes:
     name = hello.serial_number.encode("ascii")
-    fixed = _HELLO_FIXED.pack(*hello[:5], *hello.firmware, hello.adc_bits, hello.dac_bits, name)
+    fixed = _HELLO_FIXED.pack(*hello[:6], *hello.firmware, hello.adc_bits, hello.dac_bits, name)
     inputs = b"".join(_INPUT.pack(*entry) for entry in hello.inputs)
     outputs = b"".join(_OUTPUT.pack(*entry) for entry in hello.outputs)
     return fixed + inputs + outputs
@@ -280,7 +289,7 @@ def _hello_request(body: bytes) -> HelloRequest:
 
 
 def _hello(body: bytes) -> Hello:
-    nonce, boot_id, device_us, period_us, watchdog_us, *small, name = _HELLO_FIXED.unpack_from(body)
+    nonce, boot_id, session, device_us, period_us, watchdog_us, *small, name = _HELLO_FIXED.unpack_from(body)
     major, minor, patch, adc_bits, dac_bits = small
     split = _HELLO_FIXED.size + INPUT_COUNT * _INPUT.size
     inputs = tuple(InputRange(*entry) for entry in _INPUT.iter_unpack(body[_HELLO_FIXED.size : split]))
@@ -288,9 +297,8 @@ def _hello(body: bytes) -> Hello:
     if not (8 <= adc_bits <= 32 and 8 <= dac_bits <= 16):
         raise ValueError("converter width")
     firmware = (major, minor, patch)
-    return Hello(
-        nonce, boot_id, device_us, period_us, watchdog_us, firmware, adc_bits, dac_bits, _ascii(name), inputs, outputs
-    )
+    return Hello(nonce, boot_id, session, device_us, period_us, watchdog_us, firmware, adc_bits, dac_bits,
+                 _ascii(name), inputs, outputs)  # fmt: skip
 
 
 def _ascii(name: bytes) -> str:
@@ -301,23 +309,24 @@ def _ascii(name: bytes) -> str:
 
 
 def _sample(body: bytes) -> Sample:
-    sequence, device_us, state, flags, *counts = _SAMPLE.unpack(body)
-    return Sample(sequence, device_us, DeviceState(state), _flags(flags), tuple(counts))
+    session, sequence, device_us, state, flags, *counts = _SAMPLE.unpack(body)
+    return Sample(session, sequence, device_us, DeviceState(state), _flags(flags), tuple(counts))
 
 
 def _command(body: bytes) -> Command:
-    sequence, flags, *counts = _COMMAND.unpack(body)
+    session, sequence, sample, flags, *counts = _COMMAND.unpack(body)
     if flags > 7:
         raise ValueError("unknown flag")
-    return Command(sequence, CommandFlag(flags), tuple(counts))
+    return Command(session, sequence, sample, CommandFlag(flags), tuple(counts))
 
 
 def _status(body: bytes) -> Status:
-    device_us, state, fault, flags, sequence, command_us, good, bad, refused, *counts, reserved = _STATUS.unpack(body)
+    session, device_us, state, fault, flags, *numbers, reserved = _STATUS.unpack(body)
+    sequence, command_us, good, bad, refused, *counts = numbers
     if reserved != 0:
         raise ValueError("reserved byte")
     known = DeviceState(state), DeviceFault(fault), _flags(flags)
-    return Status(device_us, *known, sequence, command_us, good, bad, refused, tuple(counts))
+    return Status(session, device_us, *known, sequence, command_us, good, bad, refused, tuple(counts))
 
 
 def _flags(value: int) -> SampleFlag:

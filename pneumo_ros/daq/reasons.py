@@ -21,6 +21,7 @@ class Reason(Enum):
     LINK_OPEN = "the port is open and the board has answered"
     LINK_LOST = "the port is gone"
     LINK_BUSY = "the port cannot be opened"
+    LINK_SHARED = "frames of another session came: another host, or old ones played again"
     BOARD_REFUSED = "the board does not fit this driver or configuration"
     BOARD_RESET = "the board has restarted"
     SAMPLES_STALE = "the board is silent"

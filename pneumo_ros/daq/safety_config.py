@@ -8,8 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from pneumo_ros.documents import LARGEST, parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 from pneumo_ros.rig.channels import VALVES
@@ -98,11 +97,10 @@ def load_safety(path: str | Path | None = None) -> SafetyConfig:
     """
     source = Path(path) if path else share_file("config", "safety.yaml")
     try:
-        document = yaml.safe_load(source.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        text = " ".join(str(error).split())
-        raise InputError(f"cannot read the safety file ({text})", where=source, remedy="give readable YAML") from error
-    return parse_safety(document, str(source))
+        text = source.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"cannot read the safety file ({error})", where=source, remedy="give readable YAML") from error
+    return parse_safety(parse_yaml(text, source), str(source))
 
 
 def parse_safety(document: object, where: str) -> SafetyConfig:
@@ -191,6 +189,6 @@ def _numbers(root: Mapping[str, Any], key: str, names: tuple[str, ...], where: s
 
 
 def _number(key: str, raw: object, where: str) -> float:
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError("not a finite number", where=where, key=key, value=raw, allowed="a finite number like 4.5e+5")
     return float(raw)

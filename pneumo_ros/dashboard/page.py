@@ -26,6 +26,7 @@ from bokeh.plotting import figure
 
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
+from pneumo_ros.printable import one_line
 
 REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
 WINDOW = 10.0  # s shown
@@ -60,7 +61,7 @@ class Page:
         self._beat.js_on_change("text", CustomJS(args={"echo": self._echo}, code="echo.text = cb_obj.text"))
         self._position: Slider | None = None
         self._play: Toggle | None = None
-        document.title = f"pneumo: {source.title}"
+        document.title = f"pneumo: {one_line(source.title)}"
         document.add_root(self._layout())
         document.add_periodic_callback(self.refresh, REFRESH_MS)
         self.refresh()
@@ -147,7 +148,7 @@ class Page:
         self._gains.children = [row(*widgets[i : i + 5]) for i in range(0, len(widgets), 5)]
 
     def _widget(self, control: Control) -> Any:
-        title, name = f"{control.node}.{control.name}", f"set-{control.node}-{control.name}"
+        title, name = one_line(f"{control.node}.{control.name}"), f"set-{control.node}-{control.name}"
         if control.choices:
             widget: Any = Select(title=title, value=str(control.value), options=list(control.choices), name=name)
         elif isinstance(control.value, bool):
@@ -221,9 +222,9 @@ class Page:
         self._events.data = {
             "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" for e in newest],
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
-            "source": [e.source for e in newest],
-            "code": [e.code for e in newest],
-            "message": [e.message + "".join(f", {k} {v}" for k, v in e.values.items()) for e in newest],
+            "source": [one_line(e.source) for e in newest],
+            "code": [one_line(e.code) for e in newest],
+            "message": [one_line(e.message + "".join(f", {k} {v}" for k, v in e.values.items())) for e in newest],
         }
 
     def _show_answers(self) -> None:
@@ -231,14 +232,19 @@ class Page:
         new = self._controls.answers()
         if new:
             self._said = [*self._said, *new][-ANSWERS_SHOWN:]
-            self._answers.text = "<br>".join(escape(line) for line in self._said)
+            self._answers.text = "<br>".join(_shown(line) for line in self._said)
+
+
+def _shown(text: str) -> str:
+    """A text of a log or a node inside HTML."""
+    return escape(one_line(text))
 
 
 def _status_text(title: str, status: Status) -> str:
     seconds, length = (status.now_ns - status.start_ns) * 1e-9, (status.end_ns - status.start_ns) * 1e-9
     colour = _COLOURS[status.state]
-    remark = f", {escape(status.remark)}" if status.remark else ""
+    remark = f", {_shown(status.remark)}" if status.remark else ""
     return (
-        f"<b>{escape(title)}</b> <span style='color:white;background:{colour};padding:2px 8px'>{status.state}</span>"
+        f"<b>{_shown(title)}</b> <span style='color:white;background:{colour};padding:2px 8px'>{status.state}</span>"
         f" <span class='pneumo-time'>{seconds:.2f} s</span> of {length:.2f} s{remark}"
     )

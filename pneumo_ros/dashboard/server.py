@@ -1,9 +1,7 @@
-"""Serve the dashboard: to this computer alone unless told otherwise, and then only to who has the token."""
+"""Serve the dashboard: to this computer alone unless told otherwise, and only to who has the token."""
 
 from __future__ import annotations
 
-import hmac
-import ipaddress
 import secrets
 import signal
 import socket
@@ -14,55 +12,35 @@ from typing import Any
 from bokeh.application import Application
 from bokeh.application.handlers.function import FunctionHandler
 from bokeh.document import Document
-from bokeh.server.auth_provider import AuthProvider
 from bokeh.server.server import BaseServer
 from bokeh.server.tornado import BokehTornado
 from bokeh.server.util import bind_sockets
 from tornado.httpserver import HTTPServer
+from tornado.httputil import HTTPServerRequest
 from tornado.ioloop import IOLoop
-from tornado.web import RequestHandler
 
+from pneumo_ros.dashboard.guard import Guard, Policy, delegate
 from pneumo_ros.errors import InputError
 
-COOKIE = "pneumo_token"
-LOGIN = "/login"
+MAX_MESSAGE = 1 << 20  # bytes a browser may send at once
+MAX_BODY = 1 << 16
+IDLE = 30.0  # s an unused connection is kept
+UNUSED = 5000  # ms that a page is kept for a browser that never opened its web socket
 
 
-class _Refusal(RequestHandler):
-    """Where a viewer without the token ends up."""
+class _Guarded(BokehTornado):
+    """Bokeh's application behind the guard: its pages, its static files and its web socket."""
 
-    def get(self) -> None:
-        self.set_status(403)
-        self.set_header("Content-Type", "text/plain; charset=utf-8")
-        self.finish("This dashboard needs its token: open the address that `pneumo view` printed.\n")
+    guard: Guard | None = None
 
+    def find_handler(self, request: HTTPServerRequest, **options: Any) -> Any:
+        """Ask the guard first."""
+        own = None if self.guard is None else delegate(self, request, self.guard)
+        return super().find_handler(request, **options) if own is None else own
 
-class _TokenAuth(AuthProvider):
-    """The token comes once in the address and stays as a cookie, which the page's web socket carries as well."""
-
-    def __init__(self, token: str) -> None:
-        self._token = token
-        super().__init__()
-
-    @property
-    def get_user(self) -> Callable[[Any], str | None]:
-        def user(handler: RequestHandler) -> str | None:
-            given = handler.get_argument("token", None)
-            if given is not None and hmac.compare_digest(given.encode(), self._token.encode()):
-                handler.set_cookie(COOKIE, self._token, httponly=True, samesite="Strict")
-                return "viewer"
-            kept = handler.get_cookie(COOKIE)
-            return "viewer" if kept is not None and hmac.compare_digest(kept.encode(), self._token.encode()) else None
-
-        return user
-
-    @property
-    def login_url(self) -> str:
-        return LOGIN
-
-    @property
-    def login_handler(self) -> type[RequestHandler]:
-        return _Refusal
+    def viewers(self) -> int:
+        """Tabs that are open."""
+        return len(self.get_sessions("/"))
 
 
 @dataclass(frozen=True)
@@ -87,16 +65,6 @@ class Dashboard:
         self.server.unlisten()
 
 
-def is_loopback(host: str) -> bool:
-    """Whether only this computer can reach ``host``."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
-
-
 def serve(
     build: Callable[[Document], None], host: str = "127.0.0.1", port: int = 0, token: str | None = None
 ) -> Dashboard:
@@ -105,16 +73,16 @@ def serve(
     Parameters
     ----------
     build : fills the document of each browser tab
-    host : address to bind; anything but loopback needs a token, which is made if none is given
+    host : address to bind
     port : 0 takes a free one
-    token : asked of every viewer; None asks nobody on loopback
+    token : asked of every viewer, on this computer too: others may have accounts on it; None makes one
 
     Raises
     ------
     InputError
         if the address cannot be bound.
     """
-    secret = token or (None if is_loopback(host) else secrets.token_urlsafe(24))
+    secret = token or secrets.token_urlsafe(24)
     try:
         sockets, port = bind_sockets(host, port)
     except OSError as error:
@@ -123,15 +91,20 @@ def serve(
             where=f"{host}:{port}",
             remedy="choose another --port or --host",
         ) from error
-    # Without a token the page's origin is the guard: another site open in the same browser must not press the buttons.
-    origins = {"*"} if secret else {f"{name}:{port}" for name in ("127.0.0.1", "localhost", "[::1]")}
-    settings: dict[str, Any] = {"auth_provider": _TokenAuth(secret)} if secret else {}
-    tornado = BokehTornado({"/": Application(FunctionHandler(build))}, extra_websocket_origins=origins, **settings)
-    http = HTTPServer(tornado)
+    tornado = _Guarded(
+        {"/": Application(FunctionHandler(build))},
+        extra_websocket_origins={"*"},  # the guard has looked at the origin already, and asks for more
+        websocket_max_message_size_bytes=MAX_MESSAGE,
+        check_unused_sessions_milliseconds=UNUSED,
+        unused_session_lifetime_milliseconds=UNUSED,
+    )
+    tornado.guard = Guard(host, port, secret, tornado.viewers)
+    tornado.add_transform(Policy)
+    http = HTTPServer(tornado, max_body_size=MAX_BODY, idle_connection_timeout=IDLE, body_timeout=IDLE)
     http.add_sockets(sockets)
     server = BaseServer(IOLoop.current(), tornado, http)
     server.start()
-    return Dashboard(server, f"http://{_named(host)}:{port}/" + (f"?token={secret}" if secret else ""))
+    return Dashboard(server, f"http://{_named(host)}:{port}/?token={secret}")
 
 
 def _named(host: str) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.parameters import Active
+from pneumo_ros.files import new_file
 
 ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
 
@@ -132,9 +133,8 @@ class Experiment:
             VALVE_FILE: (f"# interpolation: held\n{columns_of}", self.valves),
         }
         for name, (header, columns) in tables.items():
-            part = folder / f"{name}.part"
-            np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
-            part.replace(folder / name)
+            with new_file(folder / name) as part:
+                np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
         return [folder / name for name in tables]
 
     def command(self, folder: Path = Path()) -> str:
@@ -241,9 +241,8 @@ class Diagnosis:
 
 def write_json(diagnosis: Diagnosis, path: Path) -> None:
     """Write diagnosis.json whole or not at all."""
-    part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(diagnosis.to_json(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    part.replace(path)
+    with new_file(path) as part:
+        part.write_text(json.dumps(diagnosis.to_json(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _finite(value: Any) -> Any:

@@ -13,9 +13,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import inspect
-import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,6 +24,7 @@ from typing import Any, NamedTuple
 import numba
 
 from pneumo_ros.effects import hooks, kernel
+from pneumo_ros.effects.cache import kept
 from pneumo_ros.plant import air_spring, half_car, orifice
 from pneumo_ros.rig import channels
 
@@ -99,21 +98,6 @@ def compose(slots: Sequence[Slot]) -> Compiled:
     return compiled
 
 
-def cache_folder() -> Path:
-    """Where generated kernels live: PNEUMO_KERNEL_CACHE, else the user's cache, else a temporary folder."""
-    base = os.environ.get("PNEUMO_KERNEL_CACHE")
-    folder = Path(base) if base else Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "pneumo_ros"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    fallback = Path(tempfile.gettempdir()) / f"pneumo_ros-{os.getuid() if hasattr(os, 'getuid') else 'kernels'}"
-    fallback.mkdir(exist_ok=True)
-    return fallback
-
-
 @lru_cache(maxsize=32)
 def _load(source: str, files: tuple[str, ...]) -> ModuleType:
     # Numba's own cache looks at the caller's file alone: a callee edited later would go unnoticed, hence all sources.
@@ -121,11 +105,7 @@ def _load(source: str, files: tuple[str, ...]) -> ModuleType:
     for file in files:
         digest.update(Path(file).read_bytes())
     name = f"kernel_{digest.hexdigest()[:20]}"
-    path = cache_folder() / f"{name}.py"
-    if not path.exists():
-        part = path.with_suffix(f".{os.getpid()}.part")
-        part.write_text(source, encoding="utf-8")
-        part.replace(path)
+    path = kept(f"{name}.py", source.encode())
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -1,4 +1,8 @@
-"""Finding effects: the package's own, a user's file, or an installed entry point."""
+"""Finding effects: the package's own, a user's file, or an installed entry point.
+
+A file is loaded only because the user named it on the command line. What runs is the copy of it in the user's cache
+that was hashed, so that neither an edit in between nor compiled remains beside the file can take its place.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,17 @@ import importlib
 import importlib.util
 import inspect
 import pkgutil
+import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from pneumo_ros.effects import library
+from pneumo_ros.effects.cache import kept
 from pneumo_ros.effects.mistakes import in_effect_file
 from pneumo_ros.errors import InputError
 
@@ -26,6 +33,29 @@ HOOKS = {
     "inputs": "inputs, period, ends, values, memory",
     "outputs": "outputs, period, channels, values, memory",
 }
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where an effect of the user's own came from: its file, and the SHA-256 of its source in hexadecimal."""
+
+    file: Path
+    digest: str
+
+
+_ORIGINS: dict[str, Origin] = {}  # by module, as they are loaded
+
+
+def origin_of(effect: Effect) -> Origin | None:
+    """The file an effect was loaded from; None for the package's own and installed ones."""
+    found = (name for name in _ORIGINS if getattr(sys.modules.get(name), "EFFECT", None) is effect)
+    return next((_ORIGINS[name] for name in found), None)
+
+
+def origins(library: Mapping[str, Effect]) -> list[str]:
+    """One line for each effect that came from a file, for people: nothing from outside takes part unseen."""
+    found = ((name, origin_of(effect)) for name, effect in library.items())
+    return [f"effect {name} is loaded from {o.file} (SHA-256 {o.digest[:16]})" for name, o in found if o is not None]
 
 
 def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) -> dict[str, Effect]:
@@ -44,7 +74,7 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     names = sorted(m.name for m in pkgutil.iter_modules(library.__path__))
     found = [importlib.import_module(f"{library.__name__}.{name}").EFFECT for name in names]
     found += [_installed(point) for point in entry_points(group=ENTRY_POINT_GROUP)]
-    found += [_effect_in(Path(path)) for path in paths]
+    found += [effect_in(Path(path)) for path in paths]
     effects = {effect.id: effect for effect in found}
     for name in without:
         if name not in effects:
@@ -93,13 +123,23 @@ def _installed(point: EntryPoint) -> Effect:
     return effect
 
 
-def _effect_in(path: Path) -> Effect:
+def effect_in(path: Path) -> Effect:
+    """The effect that a Python file of the user's defines; the file is executed.
+
+    Raises
+    ------
+    InputError
+        if it cannot be loaded or defines no effect of this form.
+    """
     from pneumo_ros.effects.contract import Effect
 
     remedy = "give a Python file that defines EFFECT = Effect(...), like those in pneumo_ros/effects/library"
     try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-        effect = getattr(module_at(f"pneumo_effect_{path.stem}_{digest}", str(path.resolve())), "EFFECT", None)
+        source = path.read_bytes()
+        digest = hashlib.sha256(source).hexdigest()
+        module = f"pneumo_effect_{re.sub(r'[^0-9A-Za-z_]', '_', path.stem)[:40]}_{digest[:20]}"
+        effect = getattr(module_at(module, str(kept(f"{module}.py", source))), "EFFECT", None)
+        _ORIGINS[module] = Origin(path.resolve(), digest)
     except Exception as error:
         raise in_effect_file(error, path) from error
     if not isinstance(effect, Effect):

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.container import (
     MAGIC,
@@ -94,13 +93,13 @@ def check_log(path: Path) -> None:
 def _listed(folder: Path) -> list[str]:
     """File names in metadata.yaml; none where there is no such file, as a killed recorder leaves it."""
     try:
-        document = yaml.safe_load((folder / "metadata.yaml").read_text(encoding="utf-8"))
+        document = parse_yaml((folder / "metadata.yaml").read_text(encoding="utf-8"), folder / "metadata.yaml")
         information = document["rosbag2_bagfile_information"]
         names = [str(name) for name in information["relative_file_paths"]]
         mode = str(information.get("compression_mode") or "").lower()
     except FileNotFoundError:
         return []
-    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
+    except (OSError, InputError, KeyError, TypeError, AttributeError, UnicodeDecodeError) as error:
         raise InputError(
             "metadata.yaml cannot be read", where=folder, remedy="remove it: the .mcap files are then taken by name"
         ) from error

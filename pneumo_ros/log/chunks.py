@@ -12,7 +12,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
-from typing import BinaryIO
+from io import FileIO
 
 import numpy as np
 import zstandard
@@ -44,12 +44,12 @@ class ChunkedWriter:
 
     Parameters
     ----------
-    stream : binary, writable; not closed here
+    stream : binary, writable, without a buffer of its own; not closed here
     profile, library : of the header
     chunk_bytes : a chunk is closed after the message that makes it this large, uncompressed
     """
 
-    def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_bytes: int) -> None:
+    def __init__(self, stream: FileIO, profile: str, library: str, chunk_bytes: int) -> None:
         self._stream, self._chunk_bytes = stream, chunk_bytes
         self._position, self._crc = 0, 0
         self._schemas: list[Schema] = []
@@ -137,11 +137,22 @@ class ChunkedWriter:
             summary += data
         footer = _encoded(Footer(start, start + len(summary), 0))[:-4]
         crc = zlib.crc32(summary + offsets + footer)
-        self._put(summary + offsets + footer + struct.pack("<I", crc) + MAGIC)
+        try:
+            self._put(summary + offsets + footer + struct.pack("<I", crc) + MAGIC)
+        except OSError:  # without its index the file is whole all the same
+            self._put(_encoded(Footer(0, 0, 0)) + MAGIC)
         self._stream.flush()
 
     def _put(self, data: bytes) -> None:
-        self._stream.write(data)
+        """Write all of it or nothing: what a full disk took of it is cut off again, so that the file ends whole."""
+        rest = memoryview(data)
+        try:
+            while rest:
+                rest = rest[self._stream.write(rest) :]
+        except OSError:
+            self._stream.truncate(self._position)
+            self._stream.seek(self._position)
+            raise
         self._crc = zlib.crc32(data, self._crc)
         self._position += len(data)
 
@@ -153,14 +164,14 @@ class ChunkedWriter:
         begin, end = int(times.min()), int(times.max())
         data = _encoded(Chunk("zstd", packed, end, begin, zlib.crc32(content), len(content)))
         start = self._position
-        self._put(data)
         offsets, indexes = {}, b""
         for number, own in entries.items():
-            offsets[number] = self._position + len(indexes)
+            offsets[number] = start + len(data) + len(indexes)
             body = own.tobytes()
             indexes += INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(body), number, len(body)) + body
+        self._put(data + indexes)
+        for number in entries:
             self._entries[number] = []
-        self._put(indexes)
         self._first = begin if not self._chunks else min(self._first, begin)
         self._last = max(self._last, end)
         self._chunks.append(

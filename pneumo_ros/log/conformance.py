@@ -182,7 +182,7 @@ def _together(log: Log) -> Iterator[Finding]:
     spans = []
     for name in names:
         if log.topics[name].count >= 2 and log.topics[name].encoding == "cdr":
-            stamps = log.columns(name).stamp_ns
+            stamps, _ = log.stamps(name)
             spans.append((int(stamps.min()), int(stamps.max())))
     if len(spans) < 2:
         return

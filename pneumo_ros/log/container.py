@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import mmap
 import struct
+import tempfile
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -28,11 +29,13 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, Header, Metadata, Schema, Statistics
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.bounds import MAX_CHANNELS, MAX_DECLARATION, MAX_RATIO, MAX_RECORDS, MEBI, chunk_limit
 
 MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")  # opcode and length before every record
 FOOTER_LENGTH = 20
 RECOVER = "pneumo log recover IN --output OUT keeps what is readable"
+LARGER = "no recorder writes this; if the log can be trusted, give a larger limit: pneumo --max-chunk MiB VERB"
 
 # In the data section these may stand, in any order; anything else there is a flipped opcode (or a future record).
 _DATA_RECORDS = {
@@ -44,9 +47,9 @@ _DATA_RECORDS = {
 class DamageError(InputError):
     """The container is broken at a known byte; what precedes it can be recovered."""
 
-    def __init__(self, fault: str, path: object, offset: int) -> None:
+    def __init__(self, fault: str, path: object, offset: int, remedy: str = RECOVER) -> None:
         self.fault, self.offset = fault, offset
-        super().__init__(f"{fault} at byte {offset}", where=path, remedy=RECOVER)
+        super().__init__(f"{fault} at byte {offset}", where=path, remedy=remedy)
 
 
 class Frame(NamedTuple):
@@ -120,7 +123,7 @@ def parse(kind: type[R], body: bytes, path: object, offset: int) -> R:
 def mapped(path: Path) -> Iterator[mmap.mmap | bytes]:
     """The file's bytes, mapped so that a long log does not have to fit in memory twice.
 
-    A file that ``ros2 bag record --compression-mode file`` packed as a whole (``.zstd``) is unpacked in memory.
+    A file that ``ros2 bag record --compression-mode file`` packed as a whole (``.zstd``) is unpacked beside it.
 
     Raises
     ------
@@ -133,7 +136,8 @@ def mapped(path: Path) -> Iterator[mmap.mmap | bytes]:
         raise InputError(f"cannot read the log ({error})", where=path, remedy="give a readable file") from error
     with stream:
         if path.suffix == ".zstd":
-            yield _unpacked(stream, path)
+            with _unpacked(stream, path) as buffer:
+                yield buffer
         elif path.stat().st_size == 0:
             yield b""
         else:
@@ -141,11 +145,23 @@ def mapped(path: Path) -> Iterator[mmap.mmap | bytes]:
                 yield buffer
 
 
-def _unpacked(stream: BinaryIO, path: Path) -> bytes:
+@contextmanager
+def _unpacked(stream: BinaryIO, path: Path) -> Iterator[mmap.mmap | bytes]:
+    """Unpacked piece by piece into a file without a name, so that memory never holds it whole."""
+    most = max(chunk_limit(), MAX_RATIO * path.stat().st_size)
     try:
-        with zstandard.ZstdDecompressor().stream_reader(stream) as reader:
-            return bytes(reader.read())
-    except (zstandard.ZstdError, MemoryError) as error:
+        with zstandard.ZstdDecompressor().stream_reader(stream) as reader, tempfile.TemporaryFile() as unpacked:
+            while piece := reader.read(MEBI):
+                if unpacked.tell() + len(piece) > most:
+                    raise InputError(f"the packed file holds more than {most >> 20} MiB", where=path, remedy=LARGER)
+                unpacked.write(piece)
+            unpacked.flush()
+            if unpacked.tell() == 0:
+                yield b""
+                return
+            with mmap.mmap(unpacked.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
+                yield buffer
+    except (zstandard.ZstdError, MemoryError, OSError) as error:
         raise InputError(
             f"the packed file is broken ({error})", where=path, remedy="nothing in it can be told"
         ) from error
@@ -205,30 +221,36 @@ def decompress(chunk: Chunk, path: object, offset: int) -> bytes:
     DamageError
         if the content does not decompress to what the chunk promises.
     """
+    if max(chunk.uncompressed_size, len(chunk.data)) > chunk_limit():
+        large = max(chunk.uncompressed_size, len(chunk.data))
+        raise DamageError(f"a chunk of {large} bytes, more than {chunk_limit() >> 20} MiB,", path, offset, LARGER)
     try:
         data = _decompressed(chunk)
     except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError) as error:
         raise DamageError(f"a chunk does not decompress ({chunk.compression!r:.20})", path, offset) from error
     if len(data) != chunk.uncompressed_size:
-        raise DamageError(f"a chunk holds {len(data)} bytes, not {chunk.uncompressed_size}", path, offset)
+        raise DamageError(f"a chunk holds other than the {chunk.uncompressed_size} bytes it states", path, offset)
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise DamageError("CRC error of a chunk", path, offset)
     return data
 
 
 def _decompressed(chunk: Chunk) -> bytes:
+    # Nothing is allocated for a size that only the compressed data state, and unpacking ends one byte past the promise.
+    most = chunk.uncompressed_size + 1
     if chunk.compression == "zstd":
-        # The size is compared before anything is allocated: a flipped bit in it must not ask for terabytes.
         size = zstandard.frame_content_size(chunk.data)
-        if size == -1:
-            return zstandard.ZstdDecompressor().decompressobj().decompress(chunk.data)
-        if size != chunk.uncompressed_size:
+        if size not in (-1, chunk.uncompressed_size):
             raise ValueError("size")
-        return zstandard.ZstdDecompressor().decompress(chunk.data)
+        if size >= 0:
+            return zstandard.ZstdDecompressor().decompress(chunk.data)
+        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+            return bytes(reader.read(most))
     if chunk.compression == "lz4":
         import lz4.frame
 
-        return bytes(lz4.frame.decompress(chunk.data))
+        unpacker = lz4.frame.LZ4FrameDecompressor()
+        return bytes(unpacker.decompress(chunk.data, max_length=most))
     if chunk.compression == "":
         return bytes(chunk.data)
     raise ValueError("compression")
@@ -242,23 +264,52 @@ def read_blocks(buffer: mmap.mmap | bytes, path: Path, contents: Contents) -> It
     DamageError
         at the first broken record, checksum or count.
     """
-    everything = list(frames(buffer, path))
+    everything, loose = _listed(buffer, path)
     data_end = next((i for i, f in enumerate(everything) if f.opcode == Opcode.DATA_END), len(everything) - 1)
     data, summary = everything[:data_end], everything[data_end:]
     check_sections(buffer, summary, contents)
     _read_small(buffer, data, contents)
-    chunks = 0
+    chunks = content = 0
     for i, frame in enumerate(data):
         if frame.opcode == Opcode.CHUNK:
             chunks += 1
             index = takewhile(lambda f: f.opcode == Opcode.MESSAGE_INDEX, islice(data, i + 1, None))
-            yield chunk_block(buffer, frame, index, contents)
-    loose = [f for f in data if f.opcode == Opcode.MESSAGE]
+            block = chunk_block(buffer, frame, index, contents)
+            content = check_ratio(content + len(block.data), buffer, path, frame.start)
+            yield block
     if loose:
         contents.unprotected = True
-        joined = b"".join(bytes(buffer[f.start : f.end]) for f in loose)
-        yield Block(joined, (), loose[0].start, len(joined))
+        joined = b"".join(bytes(buffer[begin:end]) for begin, end in loose)
+        yield Block(joined, (), loose[0][0], len(joined))
     _check_against_summary(contents, chunks, summary[0].start)
+
+
+def _listed(buffer: mmap.mmap | bytes, path: Path) -> tuple[list[Frame], list[tuple[int, int]]]:
+    """Records that must be looked at one by one, and the stretches of messages that stand outside of chunks."""
+    kept: list[Frame] = []
+    loose: list[tuple[int, int]] = []
+    for frame in frames(buffer, path):
+        if frame.opcode == Opcode.MESSAGE:
+            begin = loose.pop()[0] if loose and loose[-1][1] == frame.start else frame.start
+            loose.append((begin, frame.end))
+        elif frame.opcode < 0x80:
+            kept.append(frame)
+        if len(kept) > MAX_RECORDS:
+            raise DamageError(f"more than {MAX_RECORDS} records", path, frame.start)
+    return kept, loose
+
+
+def check_ratio(content: int, buffer: mmap.mmap | bytes, path: object, offset: int) -> int:
+    """Bytes unpacked so far, if a file of this size may hold them.
+
+    Raises
+    ------
+    DamageError
+        if no log is this much larger than its file.
+    """
+    if content > max(chunk_limit(), MAX_RATIO * len(buffer)):
+        raise DamageError(f"{content} bytes in a file of {len(buffer)}", path, offset, LARGER)
+    return content
 
 
 def _check_against_summary(contents: Contents, chunks: int, offset: int) -> None:
@@ -303,6 +354,11 @@ def take_record(contents: Contents, opcode: int, body: bytes, offset: int) -> No
     DamageError
         if it does not parse.
     """
+    if opcode != Opcode.ATTACHMENT and len(body) > MAX_DECLARATION:
+        raise DamageError(f"a declaration of {len(body)} bytes, more than {MAX_DECLARATION},", contents.path, offset)
+    counts = (contents.schemas, contents.channels, contents.metadata, contents.attachments)
+    if max(len(kind) for kind in counts) >= MAX_CHANNELS:
+        raise DamageError(f"more than {MAX_CHANNELS} schemas, channels or attachments", contents.path, offset)
     if opcode == Opcode.SCHEMA:
         schema = parse(Schema, body, contents.path, offset)
         contents.schemas[schema.id] = schema

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,20 @@ from pneumo_ros.log.layouts import Text, UnfitError
 JOINT_FIELDS = ("position", "velocity", "effort")
 
 
-def columns_of(messages: Sequence[Any]) -> tuple[dict[str, NDArray[Any]], dict[str, Text]]:
+def columns_of(messages: Iterable[Any]) -> tuple[dict[str, NDArray[Any]], dict[str, Text]]:
     """(arrays, constant texts) by field path, of deserialised messages of one type.
 
     Arrays have length N; where lengths differ from message to message, or texts change, they are object arrays.
     """
-    flat = [dict(flatten("", message)) for message in messages]
-    paths = dict.fromkeys(path for row in flat for path in row)
-    values = {path: [row.get(path) for row in flat] for path in paths}
+    values: dict[str, list[Any]] = {}
+    for i, message in enumerate(messages):
+        for path, value in flatten("", message):
+            column = values.setdefault(path, [])
+            column += [None] * (i - len(column))
+            column.append(value)
+    count = max(map(len, values.values()), default=0)
+    for column in values.values():
+        column += [None] * (count - len(column))
     # A text that never changes belongs to the topic, as in the bulk way.
     texts: dict[str, Any] = {p: v[0] for p, v in values.items() if _is_text(v[0]) and all(x == v[0] for x in v)}
     return {p: _stacked(v) for p, v in values.items() if p not in texts}, texts

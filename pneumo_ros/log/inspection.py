@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from pneumo_ros.documents import parse_yaml
+from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.reading import CONFIG_TOPIC, Log
 from pneumo_ros.rig import load_rig
@@ -18,8 +19,6 @@ SECOND = 1e9  # ns
 GAP_FACTOR = 1.5  # a pause longer than this many periods is a gap: half way to one missed sample
 JUMP = 0.1  # s; delays that change by more from one message to the next mean that a clock was set
 _PERIODIC = 10  # fewer messages say nothing about a rate
-
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # ten times faster where libyaml is there
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 
 
@@ -171,8 +170,7 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
     """One topic; topics that are not CDR are timed by their log times."""
     info = log.info(name)
     if info.encoding == "cdr" and info.count:
-        columns = log.columns(name)
-        stamps, logged = columns.stamp_ns, columns.log_time_ns
+        stamps, logged = log.stamps(name)
     else:
         stamps = logged = log.records(name).log_time_ns
     # Events and health come from several nodes at once, openings when they change: their stamps say nothing of a rate.
@@ -222,10 +220,11 @@ def read_setups(log: Log) -> Iterator[Setup]:
     """Parameters of the nodes at start and at each change, in log order; texts that are not such YAML are skipped."""
     if topics.SETUP.name not in log.topics or log.topics[topics.SETUP.name].type != topics.SETUP.type:
         return
-    for time_ns, message in log.messages(topics.SETUP.name):
+    name = topics.SETUP.name
+    for time_ns, message in log.messages(name):
         try:
-            document = yaml.load(message.data, Loader=_LOADER)
-        except yaml.YAMLError:
+            document = parse_yaml(message.data, name)
+        except InputError:
             continue
         if isinstance(document, Mapping) and "node" in document:
             rest = {str(k): v for k, v in document.items() if k not in ("node", "time_ns", "parameters")}

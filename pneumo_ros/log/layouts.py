@@ -23,6 +23,7 @@ from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.bounds import check_types
 
 ORIGIN = 4  # CDR header: two bytes of encoding (00 00 big, 00 01 little endian), two of options
 _PRIMITIVES = {
@@ -89,7 +90,10 @@ def type_store(name: str, encoding: str, definition: str) -> Typestore:
         store = get_typestore(Stores.EMPTY)
         store.register(types)
         _fill(store)
-    except (TypesysError, KeyError, ValueError, SyntaxError) as error:
+        check_types(store, name)
+    except InputError:
+        raise
+    except (TypesysError, KeyError, ValueError, SyntaxError, RecursionError, IndexError, TypeError) as error:
         raise InputError(
             f"the definition of {name} cannot be read", remedy="record it again with its schema"
         ) from error
@@ -217,13 +221,16 @@ def layout_of(store: Typestore, name: str, sample: bytes) -> Layout | None:
     return Layout(len(sample), tuple(cursor.leaves), cursor.texts, constant, np.frombuffer(sample, np.uint8))
 
 
-def decode(layout: Layout, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]] | None:
+def decode(
+    layout: Layout, rows: NDArray[np.uint8], only: tuple[str, ...] | None = None
+) -> dict[str, NDArray[Any]] | None:
     """Every number of every message, by path; None if a message does not have this layout.
 
     Parameters
     ----------
     layout : from one of the messages
     rows : (N, length) serialised messages
+    only : paths to decode; all without it
 
     Returns
     -------
@@ -231,7 +238,7 @@ def decode(layout: Layout, rows: NDArray[np.uint8]) -> dict[str, NDArray[Any]] |
     """
     if rows.shape[1] != layout.length or not _agrees(layout, rows):
         return None
-    return {leaf.path: _column(leaf, rows) for leaf in layout.leaves}
+    return {leaf.path: _column(leaf, rows) for leaf in layout.leaves if only is None or leaf.path in only}
 
 
 def _agrees(layout: Layout, rows: NDArray[np.uint8]) -> bool:

@@ -13,6 +13,7 @@ deserialised one by one by ``rosbags``, with equal results. Nothing here needs R
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +27,7 @@ from rosbags.serde import SerdeError
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.bags import Part, read_parts
 from pneumo_ros.log.generic import columns_of, joints_of
-from pneumo_ros.log.layouts import Text, UnfitError, decode, layout_of, type_store
+from pneumo_ros.log.layouts import Layout, Text, UnfitError, decode, layout_of, type_store
 from pneumo_ros.log.records import Records, join
 from pneumo_ros.rig import Rig, parse_rig
 
@@ -34,6 +35,10 @@ JOINT_STATE = "sensor_msgs/msg/JointState"
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
 STRING = "std_msgs/msg/String"
 CONFIG_TOPIC = "/rig/config"
+STAMP = ("header.stamp.sec", "header.stamp.nanosec")
+SECOND = 1_000_000_000  # ns
+# What rosbags' generated readers raise for bytes that are not the type's.
+BROKEN = (SerdeError, LookupError, AssertionError, ValueError, TypeError, OverflowError, MemoryError, struct.error)
 
 
 @dataclass(frozen=True)
@@ -221,6 +226,26 @@ class Log:
             self._columns[topic] = self._decode(topic)
         return self._columns[topic]
 
+    def stamps(self, topic: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(stamp, log time) of each message, (N,) ns each: every message is checked, no other number is kept.
+
+        Raises
+        ------
+        InputError
+            if the topic is missing, not CDR or broken.
+        """
+        records = self.records(topic)
+        if topic in self._columns:
+            return self._columns[topic].stamp_ns, records.log_time_ns
+        found = self._by_layout(topic, STAMP)
+        if found is not None:
+            return _stamps(found[1], records.log_time_ns), records.log_time_ns
+        pairs = ((time, getattr(message, "header", None)) for time, message in self.messages(topic))
+        stamps = (
+            time if header is None else header.stamp.sec * SECOND + header.stamp.nanosec for time, header in pairs
+        )
+        return np.fromiter(stamps, np.int64, len(records)), records.log_time_ns
+
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """(log time in ns, message) one by one, as plain objects with the type's fields.
 
@@ -237,7 +262,7 @@ class Log:
         for i, log_time in enumerate(records.log_time_ns.tolist()):
             try:
                 yield log_time, store.deserialize_cdr(records.message(i), info.type)
-            except (SerdeError, KeyError, IndexError, AssertionError) as error:
+            except BROKEN as error:
                 raise self._broken(topic, f"message {i} does not decode as {info.type}") from error
 
     @property
@@ -275,18 +300,27 @@ class Log:
         return InputError(what, where=self.path, key=topic)
 
     def _decode(self, topic: str) -> Columns:
+        records, found = self._records[topic], self._by_layout(topic)
+        if found is None:
+            return self._decode_slowly(topic, records)
+        layout, arrays = found
+        return Columns(_stamps(arrays, records.log_time_ns), records.log_time_ns, arrays, dict(layout.texts))
+
+    def _by_layout(
+        self, topic: str, only: tuple[str, ...] | None = None
+    ) -> tuple[Layout, dict[str, NDArray[Any]]] | None:
+        """The topic's numbers in bulk, or None where its messages differ in more than their numbers."""
         info, records = self.info(topic), self._records[topic]
         rows = records.rows()
-        if info.encoding == "cdr" and rows is not None:
-            store = type_store(info.type, info.schema_encoding, info.schema)
-            layout = layout_of(store, info.type, records.message(0))
-            arrays = decode(layout, rows) if layout else None
-            if layout is not None and arrays is not None:
-                return Columns(_stamps(arrays, records.log_time_ns), records.log_time_ns, arrays, dict(layout.texts))
-        return self._decode_slowly(topic, records)
+        if info.encoding != "cdr" or rows is None:
+            return None
+        store = type_store(info.type, info.schema_encoding, info.schema)
+        layout = layout_of(store, info.type, records.message(0))
+        arrays = decode(layout, rows, only) if layout else None
+        return None if layout is None or arrays is None else (layout, arrays)
 
     def _decode_slowly(self, topic: str, records: Records) -> Columns:
-        arrays, texts = columns_of([message for _, message in self.messages(topic)])
+        arrays, texts = columns_of(message for _, message in self.messages(topic))
         return Columns(_stamps(arrays, records.log_time_ns), records.log_time_ns, arrays, texts)
 
     def _joint_slowly(self, topic: str, columns: Columns) -> Joint:

@@ -8,6 +8,7 @@ equally long records are copied with one fancy index.
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -15,12 +16,13 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from pneumo_ros.log.container import FRAME, SMALL, Block, Contents, DamageError, take_record
+from pneumo_ros.log.container import FRAME, Block, Contents, DamageError, take_record
 
 # A Message record's fixed part: opcode, length, then channel, sequence, log and publish time (MCAP specification).
 HEAD = np.dtype([
     ("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8"),
 ])  # fmt: skip
+PRIVATE = 0x80  # opcodes from here on are private records, to be skipped
 _FIXED = HEAD.itemsize - FRAME.size  # what a Message record's length counts besides the data
 
 
@@ -128,6 +130,8 @@ def gather(block: Block, topics: Sequence[str] | None, into: dict[int, Gathered]
     if len(starts) == 0:
         return 0
     heads = _windows(block.data, HEAD.itemsize, 0)[starts].view(HEAD)
+    if max(int(heads["log"].max()), int(heads["publish"].max())) >= 1 << 63:
+        raise DamageError("a time beyond the year 2262 in the chunk", contents.path, block.offset)
     for channel in np.unique(heads["channel"]).tolist():
         if channel not in contents.channels:
             raise DamageError(f"messages of an undeclared channel {channel} in the chunk", contents.path, block.offset)
@@ -158,7 +162,7 @@ def _starts(block: Block, contents: Contents) -> NDArray[np.int64]:
     """Offsets of the message records; everything between them is walked, so nothing is missed or counted twice."""
     hinted = _hinted(block)
     if hinted is None:
-        return np.array(sorted(_walk(block, 0, len(block.data), contents)), np.int64)
+        return np.frombuffer(_walk(block, 0, len(block.data), contents), np.int64)
     ends = hinted + FRAME.size + _lengths(block.data, hinted)
     bounds = zip(
         np.concatenate([[0], ends]).tolist(), np.concatenate([hinted, [len(block.data)]]).tolist(), strict=True
@@ -192,9 +196,9 @@ def _lengths(data: bytes, starts: NDArray[np.int64]) -> NDArray[np.int64]:
     return _windows(data, 8, 1)[starts].view("<u8").astype(np.int64)
 
 
-def _walk(block: Block, begin: int, end: int, contents: Contents) -> list[int]:
+def _walk(block: Block, begin: int, end: int, contents: Contents) -> array[int]:
     """Record by record: message offsets are returned, schemas and channels kept."""
-    starts, position, unpack = [], begin, FRAME.unpack_from
+    starts, position, unpack = array("q"), begin, FRAME.unpack_from
     while position < end:
         if position + FRAME.size > end:
             raise DamageError("a record leaves its chunk", contents.path, block.offset)
@@ -204,7 +208,9 @@ def _walk(block: Block, begin: int, end: int, contents: Contents) -> list[int]:
             raise DamageError("a record leaves its chunk", contents.path, block.offset)
         if opcode == Opcode.MESSAGE:
             starts.append(position)
-        elif opcode in SMALL:
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             take_record(contents, opcode, block.data[position + FRAME.size : stop], block.offset)
+        elif opcode < PRIVATE:
+            raise DamageError(f"unexpected record 0x{opcode:02x} in a chunk", contents.path, block.offset)
         position = stop
     return starts

@@ -10,6 +10,7 @@ from mcap.writer import Writer
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.log.bags import PROFILE
 from pneumo_ros.log.reading import Log
 
@@ -38,7 +39,7 @@ def write_log(log: Log, output: Path, extra: Mapping[str, Mapping[str, str]] | N
     Parameters
     ----------
     log : to be written, in log-time order
-    output : final name; the file grows as ``<name>.part``
+    output : final name; nothing stands there before the file is complete
     extra : further metadata records, name -> entries
 
     Raises
@@ -46,9 +47,8 @@ def write_log(log: Log, output: Path, extra: Mapping[str, Mapping[str, str]] | N
     InputError
         if the file cannot be written.
     """
-    part = output.with_name(output.name + ".part")
     try:
-        with part.open("wb") as stream:
+        with new_file(output) as part, part.open("wb") as stream:
             writer = Writer(stream, chunk_size=CHUNK_BYTES, enable_data_crcs=True)
             writer.start(PROFILE, f"pneumo_ros {__version__}")
             _write_messages(writer, log)
@@ -62,9 +62,7 @@ def write_log(log: Log, output: Path, extra: Mapping[str, Mapping[str, str]] | N
                 writer.add_metadata(name, dict(entries))
             writer.finish()
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise InputError(f"cannot write ({error.strerror})", where=output, remedy="check space and rights") from error
-    part.replace(output)
     return sum(info.count for info in log.topics.values())
 
 

@@ -28,6 +28,7 @@ from pneumo_ros.log.container import (
     Contents,
     DamageError,
     Frame,
+    check_ratio,
     check_sections,
     chunk_block,
     mapped,
@@ -118,6 +119,7 @@ class _Scan:
     losses: list[Loss] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     chunks: int = 0
+    content: int = 0
     finished: bool = False
 
     def lose(self, begin: int, end: int, what: str, chunk: ChunkHeader | None = None) -> None:
@@ -252,6 +254,7 @@ def _take(scan: _Scan, frame: Frame) -> Block | None:
     buffer, contents = scan.buffer, scan.contents
     if frame.opcode == Opcode.CHUNK:
         block = chunk_block(buffer, frame, [], contents)
+        scan.content = check_ratio(scan.content + len(block.data), buffer, contents.path, frame.start)
         scan.chunks += 1
         return block
     if frame.opcode == Opcode.MESSAGE:

@@ -13,12 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError, not_one_of
+from pneumo_ros.files import new_file
 from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, Columns, Joint, Log
 
 Table = dict[str, NDArray[Any]]
 MERGED = (JOINT_STATE, FLUID_PRESSURE)
 RIG_SENSORS = ("/rig/displacement", "/rig/front/pressure", "/rig/rear/pressure")
 HELD = ("/valve/command", "/valve/applied")
+LONGEST_NAME = 120  # characters of a file's name
+FORMULA = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")  # with their full-width forms
 
 
 def table(log: Log, topic: str) -> Table:
@@ -63,8 +66,8 @@ def _plain_table(columns: Columns) -> Table:
 
 
 def file_name(topic: str, suffix: str) -> str:
-    """``/rig/front/pressure`` -> ``rig_front_pressure.csv``."""
-    return topic.strip("/").replace("/", "_") + suffix
+    """``/rig/front/pressure`` -> ``rig_front_pressure.csv``; whatever else a name holds is no part of a path."""
+    return re.sub(r"[^\w.-]", "_", topic.strip("/"))[:LONGEST_NAME].lstrip(".") + suffix
 
 
 def export(
@@ -88,16 +91,19 @@ def export(
         raise not_one_of("unknown format", kind, WRITERS, key="format")
     wanted = list(topics) if topics else [name for name, info in log.topics.items() if info.encoding == "cdr"]
     targets = [folder / file_name(name, f".{kind}") for name in wanted]
+    if len(set(targets)) < len(targets):
+        twice = next(name for k, name in enumerate(wanted) if targets[k] in targets[:k])
+        raise InputError("two topics would go to one file", where=log.path, key=twice,
+                         remedy="export them one by one: --topic")  # fmt: skip
     for target in targets:
         if target.exists() and not overwrite:
             raise InputError("the file exists already", where=target, remedy="choose another folder, or --overwrite")
     for name, target in zip(wanted, targets, strict=True):
         content = table(log, name)
-        part = target.with_name(target.name + ".part")
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            WRITERS[kind](part, content)
-            part.replace(target)
+            with new_file(target) as part:
+                WRITERS[kind](part, content)
         except OSError as error:
             raise InputError(f"cannot write ({error.strerror})", where=target) from error
     return targets
@@ -174,15 +180,24 @@ def _write_mat(path: Path, content: Table) -> None:
 def _write_csv(path: Path, content: Table) -> None:
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(content)
+        writer.writerow([harmless(name) for name in content])
         # tolist() gives Python numbers, whose repr is the shortest text that reads back to the same value.
         writer.writerows(zip(*(_plain(values) for values in content.values()), strict=True))
 
 
 def _plain(values: NDArray[Any]) -> list[Any]:
     if values.dtype == object:
-        return [v if isinstance(v, str | int | float | None) else json.dumps(_listed(v)) for v in values]
+        return [harmless(v) if isinstance(v, str) else _cell(v) for v in values]
     return values.tolist()
+
+
+def harmless(text: str) -> str:
+    """A text that a spreadsheet takes for a text: what begins like a formula gets an apostrophe in front."""
+    return f"'{text}" if text.lstrip().startswith(FORMULA) or text[:1] in ("\t", "\r", "\n") else text
+
+
+def _cell(value: Any) -> Any:
+    return value if isinstance(value, int | float | None) else json.dumps(_listed(value))
 
 
 def _listed(value: Any) -> Any:

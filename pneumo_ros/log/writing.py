@@ -6,12 +6,14 @@ grows as ``<name>.part`` and gets its name only when footer, metadata and index 
 
 from __future__ import annotations
 
+import os
 import shutil
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +22,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.log.cdr import stamp_of
 from pneumo_ros.log.chunks import ChunkedWriter
 
 CHUNK_BYTES = 192 * 1024  # the writer closes a chunk after the message that exceeds this; every one stays below 256 KiB
 FREE_BYTES_NEEDED = 64 * 1024 * 1024  # below this the file is finished while there is room for its index
+RESERVED = 1 << 20  # bytes; the index of an hour takes half of it
 DISK_CHECK_EVERY = 4096  # messages
 BATCH_PERIOD = 0.05  # s between batches of the writing thread
 ROSBAG2_VERSION = 9
@@ -89,7 +93,9 @@ class LogWriter:
         _refuse_bad_target(path)
         self._channels: dict[str, Channel] = {}
         self._schemas: dict[str, int] = {}
-        self._stream = self.part.open("wb")
+        self._stream = _new_stream(self.part)
+        self._reserve = path.with_name(f".{path.name}.reserve")
+        _reserve(self._reserve)
         self._writer = ChunkedWriter(self._stream, PROFILE, f"pneumo_ros {__version__}", CHUNK_BYTES)
         for name, values in (metadata or {}).items():
             self._writer.add_metadata(name, values)
@@ -148,7 +154,8 @@ class LogWriter:
         """
         self._finishing.set()
         self._thread.join()
-        self._writer.flush()
+        self._reserve.unlink(missing_ok=True)
+        self._attempt(self._writer.flush)
         counts = self._writer.counts
         result = Written(
             self.path,
@@ -160,15 +167,38 @@ class LogWriter:
         description = self._bag_description(result)
         text = yaml.safe_dump(description, sort_keys=False)
         end = {"complete": str(result.complete).lower(), "reason": result.reason}
-        self._writer.add_metadata("session", end)
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(
-            description["rosbag2_bagfile_information"], sort_keys=False)})  # fmt: skip
-        self._writer.finish()
+        own = yaml.safe_dump(description["rosbag2_bagfile_information"], sort_keys=False)
+        self._attempt(lambda: self._writer.add_metadata("session", end))
+        self._attempt(lambda: self._writer.add_metadata("rosbag2", {"serialized_metadata": own}))
+        self._attempt(self._writer.finish)
+        self._attempt(self._name)
         self._stream.close()
-        self.part.rename(self.path)
-        if self.bag_folder:
+        if not self.path.exists():
+            remedy = f"pneumo log recover {self.part.name} keeps what is readable"
+            return replace(result, path=self.part, complete=False, reason=f"{result.reason or self._stopped}; {remedy}")
+        if self.bag_folder and not self._stopped:
             _write_beside(self.path, text)
+        if self._stopped:
+            return replace(result, complete=False, reason=result.reason or self._stopped)
         return result
+
+    def _attempt(self, step: Callable[[], object]) -> None:
+        """A step that the file system may refuse: what is written stays, and the reason is kept."""
+        try:
+            step()
+        except OSError as error:
+            self._stopped = self._stopped or f"the file system refused to write ({error})"
+
+    def _name(self) -> None:
+        """Give the file its name; one whose folder was removed meanwhile is written again from what is still open."""
+        try:
+            self.part.rename(self.path)
+        except FileNotFoundError:
+            self._stopped = self._stopped or "the folder was removed while the log was written; it was made anew"
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream.seek(0)
+            with new_file(self.path) as part, part.open("wb") as copy:
+                shutil.copyfileobj(self._stream, copy)
 
     def _drain(self) -> None:
         """Write in batches: a thread that woke for each message would fight the callbacks for the interpreter."""
@@ -195,9 +225,14 @@ class LogWriter:
                     add(channel.number, log_ns, data, log_ns)
                 except OSError as error:
                     self._stopped = f"the file system refused to write ({error})"
+                    self._reserve.unlink(missing_ok=True)
 
     def _check_disk(self) -> None:
-        free = shutil.disk_usage(self.path.parent).free
+        try:
+            free = shutil.disk_usage(self.path.parent).free
+        except OSError as error:
+            self._stopped = f"the folder is gone ({error}); the log ends here, control goes on"
+            return
         if free < FREE_BYTES_NEEDED:
             self._stopped = f"disk nearly full ({free / 1e6:.0f} MB left); the log ends here, control goes on"
 
@@ -236,6 +271,23 @@ class LogWriter:
         return {"rosbag2_bagfile_information": information}
 
 
+def _new_stream(part: Path) -> FileIO:
+    """The growing file, never through a link; readable too, should its folder vanish."""
+    try:
+        return FileIO(part, "w+", opener=lambda name, flags: os.open(name, flags | os.O_NOFOLLOW, 0o666))
+    except OSError as error:
+        raise InputError(f"cannot create the log ({error})", where=part, remedy="choose another folder") from error
+
+
+def _reserve(path: Path) -> None:
+    """Room for the end of the file, given back when the disk is full: the log then ends with its index."""
+    with new_file(path) as part, part.open("wb") as stream:
+        try:
+            os.posix_fallocate(stream.fileno(), 0, RESERVED)
+        except OSError:  # no room for it, or a file system without: the log goes on without a reserve
+            stream.truncate(0)
+
+
 def _refuse_bad_target(path: Path) -> None:
     if path.suffix != ".mcap":
         raise InputError("a log's name must end in .mcap", where=path, remedy="choose another name")
@@ -252,6 +304,5 @@ def _write_beside(path: Path, text: str) -> None:
     target = path.with_name("metadata.yaml")
     if target.exists() and f"- {path.name}\n" not in target.read_text(encoding="utf-8"):
         return
-    part = target.with_name("metadata.yaml.part")
-    part.write_text(text, encoding="utf-8")
-    part.rename(target)
+    with new_file(target) as part:
+        part.write_text(text, encoding="utf-8")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import yaml
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from pneumo_ros.documents import parse_yaml
+from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import BY_NAME, Flow
 
 RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
@@ -70,8 +71,8 @@ def recorded_qos(name: str, text: str) -> QoSProfile:
     known = BY_NAME.get(name)
     profile = publisher_qos(known.flow, lockstep=True) if known else QoSProfile(depth=100)
     try:
-        offered = yaml.safe_load(text) or []
-    except yaml.YAMLError:
+        offered = parse_yaml(text, name) or []
+    except InputError:
         offered = []
     if not isinstance(offered, list) or not offered or not isinstance(offered[0], dict):
         return profile

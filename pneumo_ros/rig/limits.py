@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from pneumo_ros.documents import LARGEST
 from pneumo_ros.errors import InputError
 
 
@@ -95,7 +95,7 @@ def checked(name: str, raw: object, where: str) -> float:
 
 def number(key: str, raw: object, where: str) -> float:
     """A finite number; else InputError."""
-    if isinstance(raw, bool) or not isinstance(raw, int | float) or not math.isfinite(raw):
+    if isinstance(raw, bool) or not isinstance(raw, int | float) or not abs(raw) <= LARGEST:
         raise InputError(
             "not a finite number",
             where=where,

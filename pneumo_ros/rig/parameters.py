@@ -6,6 +6,7 @@ Nothing else in the package holds a number of the rig.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -34,13 +35,15 @@ class NamedEffect:
     effect : id
     site : "front", "rear", "both", "" (the whole rig) or a channel
     parameters : name and value, SI
-    file : Python file that defines it; empty for an effect of the library
+    source : SHA-256 of the Python source that defines it; empty for an effect of the library
+    file : that source, only where the user gave the rig as a file and it stands beside it: never out of a log
     """
 
     effect: str
     site: str
     parameters: tuple[tuple[str, float], ...]
-    file: str = ""
+    source: str = ""
+    file: str = field(default="", compare=False)
 
     @property
     def label(self) -> str:
@@ -48,9 +51,13 @@ class NamedEffect:
         return f"{self.effect} ({self.site or 'rig'})"
 
     def to_dict(self) -> dict[str, Any]:
-        """Entry of the list ``effects:``."""
+        """Entry of the list ``effects:``, as a log carries it: no path."""
         out = {"effect": self.effect, "site": self.site, "parameters": dict(self.parameters)}
-        return {**out, "file": self.file} if self.file else out
+        return {**out, "source": self.source} if self.source else out
+
+    def to_saved_dict(self) -> dict[str, Any]:
+        """The same for a rig file, with the name of the Python file that stands beside it."""
+        return {**self.to_dict(), "file": Path(self.file).name} if self.file else self.to_dict()
 
 
 @dataclass(frozen=True)
@@ -134,11 +141,11 @@ class Rig:
             out[name] = {"value": q.value, "std": q.std, "unit": q.unit}
         return out
 
-    def to_yaml(self) -> str:
-        """The text that /rig/config carries."""
+    def to_yaml(self, saved: bool = False) -> str:
+        """The text that /rig/config carries; ``saved``: that of a rig file, which names files beside itself."""
         document: dict[str, Any] = {"rig": self.to_dict()}
         if self.ends:
             document["ends"] = {name: {"value": value, "unit": END_LIMITS[name].unit} for name, value in self.ends}
         if self.effects:
-            document["effects"] = [one.to_dict() for one in self.effects]
+            document["effects"] = [one.to_saved_dict() if saved else one.to_dict() for one in self.effects]
         return yaml.safe_dump(document, sort_keys=False)

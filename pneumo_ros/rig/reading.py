@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 from pneumo_ros.rig.limits import END_LIMITS, LIMITS, OPTIONAL, checked, limit_of, number
@@ -30,25 +31,26 @@ def load_rig(path: str | Path | None = None) -> Rig:
         raise InputError(
             f"cannot read the rig file ({error})", where=source, remedy="give a readable YAML file"
         ) from error
-    return parse_rig(text, str(source))
+    return parse_rig(text, str(source), source.parent)
 
 
-def parse_rig(text: str, where: str = "rig") -> Rig:
+def parse_rig(text: str, where: str = "rig", folder: Path | None = None) -> Rig:
     """Read a rig from YAML text; ``where`` names the text in errors.
 
     A key that the text leaves out keeps the nominal value, except that a text without ``rig:`` is refused.
+
+    Parameters
+    ----------
+    folder : of the rig file that the user named, where files of effects may stand; without it (a log's rig) no path
+        that the text names is taken, let alone opened
     """
-    try:
-        document = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=where, remedy="mend the syntax") from error
+    document = parse_yaml(text, where)
     if not isinstance(document, Mapping) or not isinstance(document.get("rig"), Mapping):
         raise InputError("no mapping 'rig:' found", where=where, remedy="start from config/rig.yaml")
     own = {key: document[key] for key in ("model_form",) if key in document}  # some write it beside the rig's numbers
     rig = _from_mapping({**own, **document["rig"]}, where)
-    return replace(rig, ends=_ends(document.get("ends"), where), effects=_effects(document.get("effects"), where))
+    effects = _effects(document.get("effects"), where, folder)
+    return replace(rig, ends=_ends(document.get("ends"), where), effects=effects)
 
 
 def _ends(entries: object, where: str) -> tuple[tuple[str, float], ...]:
@@ -77,15 +79,15 @@ def _end(name: str, entry: object, where: str) -> float:
     return value
 
 
-def _effects(entries: object, where: str) -> tuple[NamedEffect, ...]:
+def _effects(entries: object, where: str, folder: Path | None) -> tuple[NamedEffect, ...]:
     if entries is None:
         return ()
     if not isinstance(entries, list):
         raise InputError("not a list", where=where, key="effects", value=entries, remedy="write it as --save-rig does")
-    return tuple(_effect(k, entry, where) for k, entry in enumerate(entries))
+    return tuple(_effect(k, entry, where, folder) for k, entry in enumerate(entries))
 
 
-def _effect(place: int, entry: object, where: str) -> NamedEffect:
+def _effect(place: int, entry: object, where: str, folder: Path | None) -> NamedEffect:
     key = f"effects[{place}]"
     parameters = entry.get("parameters") if isinstance(entry, Mapping) else None
     if not isinstance(entry, Mapping) or "effect" not in entry or not isinstance(parameters, Mapping):
@@ -94,7 +96,18 @@ def _effect(place: int, entry: object, where: str) -> NamedEffect:
             remedy="write {effect: ID, site: front|rear|both|..., parameters: {name: value}}",
         )  # fmt: skip
     values = tuple((str(name), number(f"{key}.parameters.{name}", v, where)) for name, v in parameters.items())
-    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("file") or ""))
+    file = _beside(str(entry.get("file") or ""), folder, f"{key}.file", where)
+    return NamedEffect(str(entry["effect"]), str(entry.get("site") or ""), values, str(entry.get("source") or ""), file)
+
+
+def _beside(name: str, folder: Path | None, key: str, where: str) -> str:
+    """The path of a file beside the rig file."""
+    if not name or folder is None:
+        return ""
+    if Path(name).name != name or (folder / name).resolve().parent != folder.resolve():
+        raise InputError("not beside the rig file", where=where, key=key, value=name, allowed="a file's name alone",
+                         remedy=f"put the file into {folder} and write its name")  # fmt: skip
+    return str((folder / name).resolve())
 
 
 def _from_mapping(entries: Mapping[str, Any], where: str) -> Rig:

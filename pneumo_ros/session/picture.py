@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pneumo_ros.paths import finished
+from pneumo_ros.files import new_file
+from pneumo_ros.printable import printable
 from pneumo_ros.rig.channels import ESTIMATED_AREAS, HEAVE, PITCH, TRUE_AREAS, TRUE_TYRE_FORCES
 from pneumo_ros.session.summary import Recorded, measured_tyre_forces, static_tyre_loads
 from pneumo_ros.units import DEGREE
@@ -33,13 +34,13 @@ def draw_session(session: Recorded, path: Path, passive: Recorded | None = None,
         if axis.get_legend_handles_labels()[0]:
             axis.legend(loc="upper right", fontsize=8, ncols=3)
         axis.margins(x=0)
-    figure.suptitle(title)
+    figure.suptitle(printable(title), parse_math=False)
     save_figure(figure, path)
 
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG and let it go."""
-    with finished(path) as part:
+    with new_file(path) as part:
         figure.savefig(part, dpi=110, format="png")
     plt.close(figure)
 

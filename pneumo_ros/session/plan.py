@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.parameters import Parameter, Value
 
@@ -58,21 +57,15 @@ def parse_setting(text: str) -> tuple[str, str, Any]:
     if not equals or not dot or not key:
         raise InputError("not of the form node.parameter=value", where="--set", value=text,
                          remedy="write for example --set controller.pole=20")  # fmt: skip
-    try:
-        return node, key, yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise InputError("broken value", where="--set", key=name, value=value, remedy="quote it") from error
+    return node, key, parse_yaml(value, f"--set {name}")
 
 
 def _load(path: Path) -> Mapping[str, Any]:
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the file ({error})", where=path, remedy="give a readable YAML file") from error
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        place = f" at line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"broken YAML{place}", where=path, remedy="mend the syntax") from error
+    document = parse_yaml(text, path)
     if not isinstance(document, Mapping):
         raise InputError("not a parameter file", where=path, remedy="start from config/session.yaml")
     return document

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
+from pneumo_ros.control.half_car import PROFILE
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
 from pneumo_ros.log import topics
@@ -29,10 +31,12 @@ from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.session.stages import ControllerStage, Course, EstimatorStage, Stage, advance
 
 TABLES: dict[str, tuple[Parameter, ...]] = {"estimator": ESTIMATION_PARAMETERS, "controller": CONTROL_PARAMETERS}
+PATH = "valve_profile"  # the one parameter that names a file
 ALIASES = {"lambda": "pole"}  # the thesis's letter for the triple pole
 # A parameter change is logged when the recorder hears of it, a few samples off; within this the recorded outputs
 # themselves show at which sample it took effect.
 CHANGE_WINDOW_NS = 200_000_000
+FASTEST = 1e5  # Hz
 _DEFAULT_RATE = 500.0  # Hz
 
 Overrides = Mapping[str, Mapping[str, Value]]
@@ -109,7 +113,9 @@ class Plan:
     changes: list[tuple[int, dict[str, Value]]] = field(default_factory=list)
 
 
-def replay(log: Log, overrides: Overrides | None = None, rig: Rig | None = None) -> Replayed:
+def replay(
+    log: Log, overrides: Overrides | None = None, rig: Rig | None = None, valves: Path | None = None
+) -> Replayed:
     """Step a log's measurements through estimator and controller.
 
     Parameters
@@ -117,6 +123,7 @@ def replay(log: Log, overrides: Overrides | None = None, rig: Rig | None = None)
     log : with /rig/displacement and both pressures
     overrides : node -> parameter -> value, over the recorded parameters for the whole session
     rig : that estimator and controller believe, in place of the log's
+    valves : the profile that the session played, if it played one
 
     Raises
     ------
@@ -127,7 +134,7 @@ def replay(log: Log, overrides: Overrides | None = None, rig: Rig | None = None)
     notes: list[str] = []
     setups = list(read_setups(log))
     rig, period = rig or log.config or load_rig(), control_period(log, setups, notes)
-    plans = {node: plan(setups, node, given.get(node, {}), notes) for node in TABLES}
+    plans = {node: plan(setups, node, given.get(node, {}), notes, valves) for node in TABLES}
     measured = measurements(log)
     recorded = {t.name: track(log, t) for t in (topics.ESTIMATE, topics.COMMAND, topics.SLIDING) if has(log, t)}
     taken = _only(measured, recorded.get(topics.ESTIMATE.name))
@@ -192,20 +199,33 @@ def control_period(log: Log, setups: Sequence[Setup], notes: list[str]) -> float
     """The session's control period, s: from its parameters, else from the measurements' stamps."""
     for setup in setups:
         if setup.node in TABLES and "rate_hz" in setup.parameters:
-            return round(1e9 / float(setup.parameters["rate_hz"])) * 1e-9
+            return round(1e9 / _rate(setup)) * 1e-9
     steps = np.diff(log.joint(topics.DISPLACEMENT.name).stamp_ns)
     period = float(np.median(steps)) * 1e-9 if len(steps) else 1.0 / _DEFAULT_RATE
     notes.append(f"the log does not state its control rate; {1.0 / period:.6g} Hz is taken from its stamps")
     return period
 
 
-def plan(setups: Sequence[Setup], node: str, overrides: Mapping[str, Value], notes: list[str]) -> Plan:
-    """What a node ran with, ``overrides`` laid over it throughout.
+def _rate(setup: Setup) -> float:
+    rate = setup.parameters["rate_hz"]
+    if isinstance(rate, int | float) and FASTEST >= rate > 1.0 / FASTEST:
+        return float(rate)
+    raise InputError("no control rate", where=setup.node, key="rate_hz", value=rate, allowed=f"up to {FASTEST:g} Hz")
+
+
+def plan(
+    setups: Sequence[Setup],
+    node: str,
+    overrides: Mapping[str, Value],
+    notes: list[str],
+    valves: Path | None = None,
+) -> Plan:
+    """What a node ran with, ``overrides`` laid over it throughout; a file that a log names is never taken from it.
 
     Raises
     ------
     InputError
-        if an override is unknown or out of range.
+        if an override is unknown or out of range, or a file is wanted that was not given.
     """
     table = TABLES[node]
     names = {parameter.name for parameter in table}
@@ -215,7 +235,9 @@ def plan(setups: Sequence[Setup], node: str, overrides: Mapping[str, Value], not
     if not own:
         notes.append(f"the log does not state the parameters of {node}; today's defaults are taken")
         return Plan(settings(table, wanted))
-    steps = [_checked(table, setup, wanted, notes) for setup in own]
+    if valves is not None and PATH in names:
+        wanted.setdefault(PATH, str(valves))
+    steps = [_checked(table, setup, wanted) for setup in own]
     found = Plan(steps[0])
     for setup, values in zip(own[1:], steps[1:], strict=True):
         before = found.changes[-1][1] if found.changes else found.start
@@ -224,11 +246,14 @@ def plan(setups: Sequence[Setup], node: str, overrides: Mapping[str, Value], not
     return found
 
 
-def _checked(
-    table: Sequence[Parameter], setup: Setup, wanted: Mapping[str, Value], notes: list[str]
-) -> dict[str, Value]:
-    names = {parameter.name for parameter in table}
-    return settings(table, {**{k: v for k, v in setup.parameters.items() if k in names}, **wanted}, setup.node)
+def _checked(table: Sequence[Parameter], setup: Setup, wanted: Mapping[str, Value]) -> dict[str, Value]:
+    names = {parameter.name for parameter in table} - {PATH}
+    found = settings(table, {**{k: v for k, v in setup.parameters.items() if k in names}, **wanted}, setup.node)
+    if found.get("controller") == PROFILE and not found.get(PATH):
+        raise InputError("the session played a valve profile, and a path that a log names is never opened",
+                         where=setup.node, key=PATH, value=setup.parameters.get(PATH),
+                         remedy="give the file: --valves FILE.csv")  # fmt: skip
+    return found
 
 
 def _build(kind: Callable[..., Stage], rig: Rig, period: float) -> Build:

@@ -23,6 +23,7 @@ from pneumo_ros.log.inspection import read_setups, seed_of
 from pneumo_ros.log.reading import Log
 from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
+from pneumo_ros.printable import printable
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.rig.channels import CHANNELS, UNITS
 from pneumo_ros.session.picture import save_figure
@@ -53,7 +54,13 @@ class Rerun:
     notes: tuple[str, ...]
 
 
-def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, build: Build | None = None) -> Rerun:
+def rerun(
+    log: Log,
+    overrides: Overrides | None = None,
+    rig: Rig | None = None,
+    build: Build | None = None,
+    valves: Path | None = None,
+) -> Rerun:
     """Run the recorded road through a rig, from rest.
 
     Parameters
@@ -62,6 +69,7 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     overrides : node -> parameter -> value, over the recorded parameters
     rig : in place of the log's
     build : makes the rig to step, for one with effects; without it the nominal equations run
+    valves : the profile that the session played, if it played one
 
     Raises
     ------
@@ -74,7 +82,9 @@ def rerun(log: Log, overrides: Overrides | None = None, rig: Rig | None = None, 
     setups = list(read_setups(log))
     rig, period = rig or log.config or load_rig(), control_period(log, setups, notes)
     given = overrides or {}
-    values = {node: plan(setups, node, given.get(node, {}), notes).start for node in ("estimator", "controller")}
+    values = {
+        node: plan(setups, node, given.get(node, {}), notes, valves).start for node in ("estimator", "controller")
+    }
     measured = measurements(log)
     start = int(measured.stamp_ns[0])
     road = _road(log, start, int(measured.stamp_ns[-1]), period)
@@ -198,5 +208,5 @@ def draw_rerun(result: Rerun, path: Path, title: str, label: str = "closed loop,
         axis.margins(x=0)
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(printable(title), fontsize=10, parse_math=False)
     save_figure(figure, path)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.log import topics
 from pneumo_ros.log.topics import Topic
+from pneumo_ros.printable import printable
 from pneumo_ros.rig import Rig
 from pneumo_ros.session.picture import save_figure
 from pneumo_ros.session.replay import Replayed, Track
@@ -109,7 +110,7 @@ def draw_overlay(replayed: Replayed, path: Path, title: str) -> None:
         axis.margins(x=0)
     axes[0].legend(loc="upper right", ncols=2)
     axes[-1].set_xlabel("time (s)")
-    figure.suptitle(f"{title}\n{CAVEAT}", fontsize=10)
+    figure.suptitle(printable(f"{title}\n{CAVEAT}"), fontsize=10, parse_math=False)
     save_figure(figure, path)
 
 

@@ -11,7 +11,7 @@ from jinja2 import Environment
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 
-from pneumo_ros.paths import finished
+from pneumo_ros.files import new_file
 from pneumo_ros.thesis.equations import equation_index
 from pneumo_ros.thesis.report import Chapter, Claim
 from pneumo_ros.thesis.settings import ThesisSettings
@@ -98,5 +98,5 @@ def _row(claim: Claim) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    with finished(path) as part:
+    with new_file(path) as part:
         part.write_text(text, encoding="utf-8")

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
+from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.parameters import Parameter, settings
 from pneumo_ros.paths import share_file
@@ -83,9 +82,10 @@ def load_settings(path: str | Path | None = None) -> ThesisSettings:
     """
     source = Path(path) if path is not None else share_file("config", "thesis.yaml")
     try:
-        document = yaml.safe_load(source.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        text = source.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read the settings ({error})", where=source, remedy="give a YAML file") from error
+    document = parse_yaml(text, source)
     if not isinstance(document, Mapping) or not isinstance(document.get("thesis"), Mapping):
         raise InputError("no mapping 'thesis:' found", where=source, remedy="start from config/thesis.yaml")
     return ThesisSettings(**settings(PARAMETERS, document["thesis"], source))  # type: ignore[arg-type]

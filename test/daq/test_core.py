@@ -163,7 +163,7 @@ def test_a_restart_whose_announcement_is_lost_is_noticed() -> None:
     bench.boot()
     bench.to_host.clear()
     bench.run(400)
-    assert Reason.BOARD_DISARMED in bench.reasons()
+    assert Reason.BOARD_RESET in bench.reasons() and Reason.LINK_SHARED in bench.reasons()
     assert bench.core.intake is not None and bench.core.intake.hello.boot_id == 99
 
 

@@ -160,7 +160,7 @@ def test_mutated_frames_never_crash_nor_pass_with_a_wrong_crc(
 @settings(max_examples=500, deadline=None)
 @given(st.binary(max_size=600), st.integers(1, 97))
 def test_resync_after_noise_loses_at_most_one_good_frame(noise: bytes, portion: int) -> None:
-    good = [Sample(i, i * 1000, frames.DeviceState.SAFE, frames.SampleFlag(0), (i,) * 7) for i in range(5)]
+    good = [Sample(1, i, i * 1000, frames.DeviceState.SAFE, frames.SampleFlag(0), (i,) * 7) for i in range(5)]
     stream = noise + b"".join(map(encode, good))
     decoder = StreamDecoder()
     found: list[Record] = []
@@ -172,7 +172,7 @@ def test_resync_after_noise_loses_at_most_one_good_frame(noise: bytes, portion: 
 def test_any_single_to_triple_bit_error_is_caught() -> None:
     """CRC-16/IBM-3740 has Hamming distance 4 at these lengths; COBS turns a hit on a code byte into a longer error."""
     rng = random.Random(5)
-    wire = encode(Command(77, CommandFlag.ARM, (1, 0, 4095, 256)))[:-1]
+    wire = encode(Command(5, 77, 3, CommandFlag.ARM, (1, 0, 4095, 256)))[:-1]
     payload = cobs.decode(wire)
     for _ in range(5000):
         damaged = bytearray(payload)
@@ -187,7 +187,7 @@ def test_memory_stays_bounded_without_delimiters() -> None:
     for _ in range(1000):
         decoder.feed(b"\x7e" * 1000)
     assert len(decoder._pending) <= frames.MAX_FRAME
-    assert len(decoder.feed(b"\x00" + encode(Command(1, CommandFlag(0), (0, 0, 0, 0))))) == 1
+    assert len(decoder.feed(b"\x00" + encode(Command(5, 1, 0, CommandFlag(0), (0, 0, 0, 0))))) == 1
     assert decoder.rejected[Reject.OVERLONG] == 1
 
 

@@ -27,9 +27,9 @@ from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
+from pneumo_ros.dashboard.guard import is_loopback
 from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
-from pneumo_ros.dashboard.server import is_loopback
 from pneumo_ros.dashboard.source import Playback
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import read_events
@@ -144,19 +144,25 @@ def greeted(url: str, origin: str, cookie: str = "") -> bool:
         return False
 
 
-def test_only_this_computer_and_this_page_or_the_token(log_path: Path) -> None:
+def test_only_this_computer_and_this_page_with_the_token(log_path: Path) -> None:
     assert is_loopback("127.0.0.1") and is_loopback("localhost") and not is_loopback("0.0.0.0")
-    with served(str(log_path)) as (url, _):
-        assert url.startswith("http://127.0.0.1:") and "token" not in url and fetch(url) == 200
-        assert greeted(url, url.rstrip("/")) and not greeted(url, "http://evil.example")
-    with served(str(log_path), "--host", "0.0.0.0") as (url, _):
-        bare, token = re.sub(r"//[^:]+:", "//127.0.0.1:", url).split("?token=")
-        assert len(token) >= 24
-        assert fetch(bare) == 403 and fetch(f"{bare}?token=wrong") == 403
-        assert fetch(f"{bare}?token={token}") == 200
-        assert fetch(bare, Cookie=f"pneumo_token={token}") == 200
-        assert not greeted(bare, "http://evil.example") and not greeted(bare, bare.rstrip("/"))
-        assert greeted(bare, bare.rstrip("/"), f"pneumo_token={token}")
+    for options in ((), ("--host", "0.0.0.0")):
+        with served(str(log_path), *options) as (url, _):
+            bare, token = re.sub(r"//[^:]+:", "//127.0.0.1:", url).split("?token=")
+            kept, origin, port = f"pneumo_token={token}", bare.rstrip("/"), bare.rstrip("/").rpartition(":")[2]
+            assert len(token) >= 24 and (options or url.startswith("http://127.0.0.1:"))
+            for path in ("", "?token=wrong", "static/js/bokeh.min.js", "ws", "autoload.js", "nothing"):
+                assert fetch(bare + path) == 403, path
+            assert fetch(f"{bare}?token={token}") == 403  # without a cookie jar: sent on to the page, without the token
+            assert fetch(bare, Cookie=kept) == 200 and fetch(bare, **{"X-Pneumo-Token": token}) == 200
+            assert fetch(f"{bare}static/js/bokeh.min.js", Cookie=kept) == 200
+            # A site whose name was bound to this computer's address comes with its own name (DNS rebinding).
+            for host in (f"evil.example:{port}", "127.0.0.1", "127.0.0.1:1", f"127.0.0.1.evil.example:{port}", ""):
+                assert fetch(bare, Cookie=kept, Host=host) in (400, 403), host
+            assert fetch(bare, Cookie=kept, Origin="http://evil.example") == 403
+            assert not greeted(bare, "http://evil.example", kept) and not greeted(bare, origin)
+            assert not greeted(bare, "null", kept) and not greeted(bare, origin, "pneumo_token=wrong")
+            assert greeted(bare, origin, kept)
 
 
 @pytest.mark.realtime

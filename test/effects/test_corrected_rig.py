@@ -157,22 +157,28 @@ def test_the_saved_rig_is_the_fitted_structure(record: Signals, tmp_path: Path) 
     assert corrected_rig(again, RigModel(saved, LIBRARY)) == saved
 
 
-def test_an_effect_of_ones_own_travels_as_a_file(record: Signals, tmp_path: Path) -> None:
-    """Saved with the path of its file; where that is missing, the error asks for it."""
-    file = tmp_path / "tilted.py"
+def test_an_effect_of_ones_own_travels_as_a_file_beside_the_rig(record: Signals, tmp_path: Path) -> None:
+    """Saved with its source beside the rig file; a log has id and hash only, and asks for the file."""
+    file = tmp_path / "own" / "tilted.py"
+    file.parent.mkdir()
     source = Path(str(LIBRARY["lvdt_offset"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
     file.write_text(source.replace('id="lvdt_offset"', 'id="tilted"'))
     model = RigModel(NOMINAL, load_library([file]))
-    rig = corrected_rig(found_in(model, np.array([p.nominal for p in model.parameters]),
-                                 Active("tilted", "sprung_rear", (1e-3,))), model, [file])  # fmt: skip
-    assert rig.effects[0].file == str(file)
-    shown = stepped(stepped_rig(parse_rig(rig.to_yaml()), record.period), record)
+    found = found_in(model, np.array([p.nominal for p in model.parameters]), Active("tilted", "sprung_rear", (1e-3,)))
+    rig = load_rig(save_corrected_rig(found, model, tmp_path / "rig.yaml"))
+    assert rig.effects[0].file == str(tmp_path / "tilted.py") and rig == corrected_rig(found, model)
+    shown = stepped(stepped_rig(rig, record.period), record)
     np.testing.assert_allclose(
         shown[:, 1] - stepped(stepped_rig(NOMINAL, record.period), record)[:, 1], 1e-3, atol=1e-9
     )
-    file.unlink()
-    with pytest.raises(InputError, match=r"unknown effect.*tilted.py is not here"):
-        stepped_rig(rig, record.period)
+    with pytest.raises(InputError, match=r"unknown effect.*--effect FILE"):
+        stepped_rig(parse_rig(rig.to_yaml()), record.period)
+    (tmp_path / "tilted.py").write_text("EFFECT = None\n")
+    with pytest.raises(InputError, match="changed while it was in use"):
+        save_corrected_rig(found, model, tmp_path / "rig.yaml")
+    load_library([file])
+    with pytest.raises(InputError, match="another file of this name stands there"):
+        save_corrected_rig(found, model, tmp_path / "rig.yaml")
 
 
 # -- corrected rigs in sessions, emulator and replay -----------------------------------------------------------------

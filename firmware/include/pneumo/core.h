@@ -7,6 +7,7 @@
 
 #define PNEUMO_STATUS_PERIOD_US 100000u
 #define PNEUMO_CONVERTER_FAILURES 5u
+#define PNEUMO_SESSION_SPREAD 2654435761u /* Knuth's multiplier: sessions of neighbouring boot ids lie far apart */
 
 struct pneumo_core {
     struct pneumo_hal hal;
@@ -17,6 +18,7 @@ struct pneumo_core {
     uint8_t flags;
     bool may_arm;      /* an accepted COMMAND without ARM came since SAFE was entered */
     bool has_sequence; /* a COMMAND was accepted since the handshake */
+    uint32_t session; /* another one after every handshake and boot: old frames belong to none */
     uint32_t command_sequence, command_us;
     uint32_t sample_sequence;
     uint32_t status_us;

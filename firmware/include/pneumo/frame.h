@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define PNEUMO_PROTOCOL_VERSION 1u
+#define PNEUMO_PROTOCOL_VERSION 2u
 #define PNEUMO_MAX_FRAME 254u /* bytes before the delimiter */
 #define PNEUMO_INPUTS 7
 #define PNEUMO_OUTPUTS 4
@@ -65,7 +65,7 @@ struct pneumo_output_range {
 };
 
 struct pneumo_hello {
-    uint32_t nonce, boot_id, device_us, sample_period_us, watchdog_us;
+    uint32_t nonce, boot_id, session, device_us, sample_period_us, watchdog_us;
     uint8_t firmware[3];
     uint8_t adc_bits, dac_bits;
     char serial_number[PNEUMO_SERIAL_SIZE]; /* filled up with 0, not necessarily terminated */
@@ -74,19 +74,20 @@ struct pneumo_hello {
 };
 
 struct pneumo_sample {
-    uint32_t sequence, device_us;
+    uint32_t session, sequence, device_us;
     uint8_t state, flags;
     int32_t counts[PNEUMO_INPUTS];
 };
 
 struct pneumo_command {
-    uint32_t sequence;
+    uint32_t session, sequence;
+    uint32_t sample; /* one more than the latest SAMPLE the host had: how old the command is */
     uint8_t flags;
     uint16_t counts[PNEUMO_OUTPUTS];
 };
 
 struct pneumo_status {
-    uint32_t device_us;
+    uint32_t session, device_us;
     uint8_t state, fault, flags;
     uint32_t command_sequence, command_us, good_frames, bad_frames, refused_commands;
     uint16_t counts[PNEUMO_OUTPUTS];

@@ -34,6 +34,7 @@ def board_identity(
     return Hello(
         nonce=0,
         boot_id=boot_id,
+        session=0,
         device_us=0,
         sample_period_us=SAMPLE_PERIOD_US,
         watchdog_us=watchdog_us,

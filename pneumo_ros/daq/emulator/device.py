@@ -30,6 +30,7 @@ STATUS_PERIOD_US = 100_000
 CONVERTER_FAILURES = 5  # in a row, while armed
 NO_FLAGS = SampleFlag(0)
 _WRAP = 1 << 32
+SPREAD = 2_654_435_761  # Knuth's multiplier: sessions of neighbouring boot ids lie far apart
 
 
 @dataclass
@@ -51,6 +52,7 @@ class Device:
     outputs: tuple[int, ...] = ()
     decoder: StreamDecoder = field(default_factory=StreamDecoder)
     refused_commands: int = 0
+    session: int = 0
     _flags: SampleFlag = NO_FLAGS
     _may_arm: bool = False
     _has_sequence: bool = False
@@ -64,6 +66,7 @@ class Device:
         """Rule 1: safe outputs, then the announcement."""
         self._set_safe_outputs()
         self._status_us = now_us
+        self.session = self.identity.boot_id * SPREAD % _WRAP
         self._send_hello(0, now_us)
 
     def power_down(self) -> None:
@@ -106,6 +109,7 @@ class Device:
     def _on_hello_request(self, request: HelloRequest, now_us: int) -> None:
         if self.state is DeviceState.ARMED:
             self._leave_armed(DeviceState.SAFE, DeviceFault.HANDSHAKE, now_us)
+        self.session = (self.session + 1) % _WRAP
         self._may_arm = self._has_sequence = False
         self._command_sequence = 0
         self._send_hello(request.nonce, now_us)
@@ -130,7 +134,15 @@ class Device:
         top = (1 << self.identity.dac_bits) - 1
         ahead = (command.sequence - self._command_sequence) % _WRAP
         newer = not self._has_sequence or 0 < ahead < _WRAP // 2
-        return newer and all(count <= top for count in command.counts)
+        own = command.session == self.session
+        return own and newer and self._fresh(command) and all(count <= top for count in command.counts)
+
+    def _fresh(self, command: Command) -> bool:
+        """What opens valves or ends a stop answers a sample of just now; what closes them may be of any age."""
+        if not command.flags & (CommandFlag.ARM | CommandFlag.RESET):
+            return True
+        behind = (self._sample_sequence - command.sample) % _WRAP
+        return behind * self.identity.sample_period_us <= self.identity.watchdog_us
 
     def _when_safe(self, command: Command, now_us: int) -> None:
         """Rule 3: arming needs the edge."""
@@ -194,10 +206,10 @@ class Device:
         self.write_outputs(counts)
 
     def _send_hello(self, nonce: int, now_us: int) -> None:
-        self.send(encode(self.identity._replace(nonce=nonce, device_us=now_us)))
+        self.send(encode(self.identity._replace(nonce=nonce, session=self.session, device_us=now_us)))
 
     def _send_sample(self, now_us: int, counts: tuple[int, ...]) -> None:
-        self.send(encode(Sample(self._sample_sequence, now_us, self.state, self._flags, counts)))
+        self.send(encode(Sample(self.session, self._sample_sequence, now_us, self.state, self._flags, counts)))
         self._sample_sequence = (self._sample_sequence + 1) % _WRAP
 
     def _send_status(self, now_us: int) -> None:
@@ -206,6 +218,7 @@ class Device:
 
     def _status(self, now_us: int) -> Status:
         return Status(
+            session=self.session,
             device_us=now_us,
             state=self.state,
             fault=self.fault,

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.files import new_file
+
 COLUMNS = 7
 
 
@@ -57,7 +59,6 @@ class EmulatorRecord:
 
     def save(self, path: Path) -> None:
         """Write everything to one .npz; the name appears only when it is complete."""
-        part = path.with_name(path.name + ".part.npz")
         columns: dict[str, Any] = {**self.arrays(), "events": json.dumps(self.events), "overruns": self.overruns}
-        np.savez(part, **columns)
-        part.replace(path)
+        with new_file(path) as part, part.open("wb") as stream:
+            np.savez(stream, **columns)

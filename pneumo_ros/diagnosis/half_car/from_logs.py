@@ -16,8 +16,9 @@ from pneumo_ros.diagnosis.search.competition import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
 from pneumo_ros.effects import library as own_effects
-from pneumo_ros.effects.configured import library_of
+from pneumo_ros.effects.configured import library_of, with_files
 from pneumo_ros.effects.contract import Effect
+from pneumo_ros.effects.loading import origins
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -70,13 +71,14 @@ def prepared(
     if not fit:
         raise InputError("no log to fit", remedy="give at least one log")
     first = read_signals(fit[0], rig)
-    library = library_of(first.rig, effects)
+    own = with_files(first.rig, effects)
+    library = library_of(own, effects)
     for name in without:
         if name not in library:
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
     logs = [first, *(read_signals(path, rig) for path in fit[1:])]
-    model = RigModel(first.rig, library, frozenset(without))
-    notes = [*_outside(library), *_standing_notes(model)]
+    model = RigModel(own, library, frozenset(without))
+    notes = [*_outside(library), *origins(library), *_standing_notes(model)]
     if holdout is None:
         check_pair(logs, None)
         logs, held = split_by_time(logs)

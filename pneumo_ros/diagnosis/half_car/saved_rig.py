@@ -8,6 +8,7 @@ that this command really gives, and it is an end's own.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,22 +17,18 @@ import numpy as np
 
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.loading import origin_of
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import NUISANCE, RigModel
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
 
 _OUTLETS = ("outlet_area_front", "outlet_area_rear")
 
 
-def corrected_rig(found: Diagnosis, model: RigModel, files: Sequence[Path] = ()) -> Rig:
-    """The model's rig as diagnosed: its numbers, what its ends have of their own, its effects.
-
-    Parameters
-    ----------
-    files : Python files with effects of the user's own, so that the rig file can name them
-    """
+def corrected_rig(found: Diagnosis, model: RigModel) -> Rig:
+    """The model's rig as diagnosed: its numbers, what its ends have of their own, its effects."""
     estimates = {name: estimate.value for name, estimate in found.nuisance.items()}
     means: dict[str, list[float]] = {}
     for name, quantity in NUISANCE.items():
@@ -43,7 +40,7 @@ def corrected_rig(found: Diagnosis, model: RigModel, files: Sequence[Path] = ())
     own |= {"reference_pressure_front": base.front.reference_pressure,
             "reference_pressure_rear": base.rear.reference_pressure}  # fmt: skip
     rig, rest = _folded(rig, found.active)
-    effects = (*rig.effects, *(_named(one, model.library, files) for one in rest))
+    effects = (*rig.effects, *(_named(one, model.library) for one in rest))
     return replace(rig, ends=tuple(own.items()), effects=effects)
 
 
@@ -68,26 +65,46 @@ def _numbers(rig: Rig, one: Active) -> dict[str, float]:
     return {}
 
 
-def _named(one: Active, library: Mapping[str, Effect], files: Sequence[Path]) -> NamedEffect:
+def _named(one: Active, library: Mapping[str, Effect]) -> NamedEffect:
     effect = library[one.effect]
     values = tuple((p.name, float(v)) for p, v in zip(effect.parameters, one.values, strict=True))
-    # A file is loaded once for each content, so the same object comes back.
-    file = next((f for f in files if load_library([f]).get(one.effect) is effect), None)
-    return NamedEffect(one.effect, one.site, values, "" if file is None else str(file.resolve()))
+    origin = origin_of(effect)
+    if origin is None:
+        return NamedEffect(one.effect, one.site, values)
+    return NamedEffect(one.effect, one.site, values, origin.digest, str(origin.file))
 
 
-def save_corrected_rig(found: Diagnosis, model: RigModel, path: Path, files: Sequence[Path] = ()) -> Path:
-    """Write the corrected rig; an older file is replaced.
+def save_corrected_rig(found: Diagnosis, model: RigModel, path: Path) -> Path:
+    """Write the corrected rig, and the sources of its own effects beside it; an older rig file is replaced.
 
     Raises
     ------
     InputError
         if the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
+    rig = corrected_rig(found, model)
     try:
-        part.write_text(corrected_rig(found, model, files).to_yaml(), encoding="utf-8")
-        part.replace(path)
+        for one in rig.effects:
+            _put_beside(one, path.parent)
+        with new_file(path) as part:
+            part.write_text(rig.to_yaml(saved=True), encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the rig ({error})", where=path, remedy="choose another path") from error
     return path
+
+
+def _put_beside(one: NamedEffect, folder: Path) -> None:
+    """A rig file may name an effect's source only where it stands beside it."""
+    if not one.file:
+        return
+    source, target = Path(one.file), folder / Path(one.file).name
+    content = source.read_bytes()
+    if hashlib.sha256(content).hexdigest() != one.source:
+        raise InputError("the effect's file changed while it was in use", where=source, key=one.effect,
+                         remedy="diagnose again")  # fmt: skip
+    if not target.exists():
+        with target.open("xb") as stream:
+            stream.write(content)
+    elif target.read_bytes() != content:
+        raise InputError("another file of this name stands there", where=target, key=one.effect,
+                         remedy="save the rig into another folder")  # fmt: skip

@@ -12,6 +12,8 @@ from markupsafe import Markup, escape
 from pneumo_ros.diagnosis.report.contents import Findings, contents
 from pneumo_ros.diagnosis.report.rig_map import colour
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
+from pneumo_ros.printable import shown
 
 TEMPLATE = "template.html.j2"
 
@@ -19,7 +21,9 @@ TEMPLATE = "template.html.j2"
 def render(found: Findings) -> str:
     """The page's HTML; it refers to nothing outside itself."""
     source = resources.files(__package__).joinpath(TEMPLATE).read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=shown
+    )
     environment.filters["whole_options"] = whole_options
     return environment.from_string(source).render(contents(found), cold=colour(0.0), hot=colour(1.0))
 
@@ -37,9 +41,8 @@ def write_report(path: Path, found: Findings) -> None:
     InputError
         if the folder cannot be written.
     """
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(render(found), encoding="utf-8")
-        part.replace(path)
+        with new_file(path) as part:
+            part.write_text(render(found), encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the report ({error})", where=path, remedy="choose another folder") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -107,8 +108,8 @@ def scatter(
     return (
         f'<svg class="law" viewBox="0 0 {width} {height + 16}" role="img" aria-label="{labels[1]} over {labels[0]}">'
         f'{_axes(scale, "", "")}{zero}<path class="dots" d="{dots}"/><polyline class="curve" points="{points}"/>'
-        f'<text class="tick unit" x="{width - RIGHT}" y="{height + 12}" text-anchor="end">{labels[0]}</text>'
-        f'<text class="tick unit" x="{LEFT + 6}" y="{TOP + 10}">{labels[1]}</text></svg>'
+        f'<text class="tick unit" x="{width - RIGHT}" y="{height + 12}" text-anchor="end">{escape(labels[0])}</text>'
+        f'<text class="tick unit" x="{LEFT + 6}" y="{TOP + 10}">{escape(labels[1])}</text></svg>'
     )
 
 
@@ -173,7 +174,7 @@ def ladder(steps: Sequence[tuple[str, float, str]], width: int = 860, row: int =
     for k, (label, gap, style) in enumerate(steps):
         y = 6 + k * row
         rows.append(
-            f'<text class="rung" x="{left - 10}" y="{y + 13}" text-anchor="end">{label}</text>'
+            f'<text class="rung" x="{left - 10}" y="{y + 13}" text-anchor="end">{escape(label)}</text>'
             f'<rect class="rung {style}" x="{left}" y="{y}" width="{x(gap) - left + 1:.1f}" height="{row - 8}" rx="2"/>'
             f'<text class="rung value" x="{x(gap) + 8:.1f}" y="{y + 13}">{gap:.3g}</text>'
         )

@@ -8,8 +8,9 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.files import new_file
 from pneumo_ros.log.reading import Log
-from pneumo_ros.paths import finished
+from pneumo_ros.printable import shown
 from pneumo_ros.session.report.contents import contents
 from pneumo_ros.session.summary import Recorded
 
@@ -19,7 +20,9 @@ TEMPLATE = "template.html.j2"
 def render(log: Log, passive: Recorded | None = None) -> str:
     """The page's HTML; it refers to nothing outside itself."""
     source = resources.files(__package__).joinpath(TEMPLATE).read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=shown
+    )
     return environment.from_string(source).render(contents(log, passive))
 
 
@@ -39,7 +42,7 @@ def write_report(log: Log, path: Path, passive: Recorded | None = None) -> None:
     """
     page = render(log, passive)
     try:
-        with finished(path) as part:
+        with new_file(path) as part:
             part.write_text(page, encoding="utf-8")
     except OSError as error:
         raise InputError(f"cannot write the report ({error})", where=path, remedy="choose another folder") from error
