@@ -21,6 +21,7 @@ from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
 from pneumo_ros.diagnosis.search.competition import Contest, Effort, Progress, compete
+from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
@@ -76,6 +77,7 @@ def diagnose(
     options = options or Options()
     tell = progress or (lambda share, what: None)
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
+    grow(contest, options.limits)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)
     held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)

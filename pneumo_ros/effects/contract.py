@@ -83,6 +83,7 @@ class Effect:
     parameters : those with ``size=True`` are zero when there is no effect
     derived : what they give together
     plant, inputs, outputs, term : hooks, see the module
+    slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     """
 
     id: str
@@ -96,6 +97,13 @@ class Effect:
     outputs: Callable[[Array, float, tuple[int, ...], Values, Memory], tuple[Array, Memory]] | None = None
     undo: Callable[[Array, tuple[int, ...], Values], Array] | None = None
     term: PlantTerm | None = None
+    slot: str = ""
+    columns: tuple[int, ...] = ()
+
+    @property
+    def place_in_kernel(self) -> str:
+        """Name of the kernel's slot that its term runs in: shapes of one place share one, their amplitudes add up."""
+        return self.slot or self.id
 
 
 def by_column(

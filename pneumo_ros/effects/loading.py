@@ -40,8 +40,11 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     InputError
         if a file cannot be loaded, defines no effect, or ``without`` names an unknown id.
     """
+    from pneumo_ros.effects.shapes.families import SHAPES
+
     names = sorted(m.name for m in pkgutil.iter_modules(library.__path__))
     found = [importlib.import_module(f"{library.__name__}.{name}").EFFECT for name in names]
+    found += SHAPES.values()
     found += [_installed(point) for point in entry_points(group=ENTRY_POINT_GROUP)]
     found += [_effect_in(Path(path)) for path in paths]
     effects = {effect.id: effect for effect in found}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,6 +32,7 @@ class EffectParameter:
     typical : a size (or shape) worth trying first; also the scale of the fit
     size : True for the parameter whose zero means "no effect"; False for one that shapes it
     starts : further values to start the fit from
+    spread : prior standard deviation, in typical values; infinite where nothing is known beforehand
     ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
         well stop; a stop at another bound is counted against the effect
     """
@@ -43,6 +45,23 @@ class EffectParameter:
     size: bool = False
     starts: tuple[float, ...] = ()
     ends: tuple[float, ...] = (0.0,)
+    spread: float = math.inf
+
+
+SHAPE, ANYTHING = (
+    "shape",
+    "anything",
+)  # a family's shape is called <family>.shape, what may act anywhere anything.<place>
+
+
+def family_of(effect: str) -> str:
+    """The mechanism that an effect of the library is a law or the shape of: its id up to the first dot."""
+    return effect.partition(".")[0]
+
+
+def is_law(effect: str) -> bool:
+    """Whether an effect competes by itself: a law of a family, neither its shape nor a place's ceiling."""
+    return not effect.endswith(f".{SHAPE}") and family_of(effect) != ANYTHING
 
 
 @dataclass(frozen=True)

@@ -305,9 +305,13 @@ class RigModel:
     @cached_property
     def slots(self) -> tuple[Slot, ...]:
         """Terms of the library in the kernel's order."""
-        return tuple(
-            Slot(e.id, e.term, len(e.parameters)) for _, e in sorted(self.library.items()) if e.term is not None
-        )
+        found: dict[str, Slot] = {}
+        for _, e in sorted(self.library.items()):
+            if e.term is not None:
+                name, count = e.place_in_kernel, max([len(e.parameters), *(column + 1 for column in e.columns)])
+                known = found.get(name)
+                found[name] = Slot(name, e.term, max(count, known.parameters if known else 0))
+        return tuple(found[name] for name in sorted(found))
 
     @cached_property
     def kernel(self) -> Compiled:
@@ -332,9 +336,15 @@ class RigModel:
         on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
         values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in self.slots)])))
         for one in terms:
+            effect = self.library[one.effect]
+            k = slots[effect.place_in_kernel]
             for end in ends_of(one.site).columns:
-                on[slots[one.effect], end] = True
-                values[slots[one.effect], end, : len(one.values)] = one.values
+                if not effect.columns:
+                    values[k, end, : len(one.values)] = one.values
+                else:
+                    values[k, end] = values[k, end] if on[k, end] else 0.0
+                    values[k, end, list(effect.columns)] += one.values
+                on[k, end] = True
         return on, values
 
 

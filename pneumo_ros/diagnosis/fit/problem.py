@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.effects.parameters import Active, EffectParameter
+from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
 AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
 MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
@@ -34,6 +34,16 @@ class Candidate:
     """A set of effects at sites; empty: the nominal structure re-estimated."""
 
     parts: tuple[Part, ...] = ()
+
+    @property
+    def laws(self) -> tuple[Part, ...]:
+        """The effects that are claimed, without the shapes that take up what their laws leave."""
+        return tuple(part for part in self.parts if is_law(part[0]))
+
+    @property
+    def shapes(self) -> tuple[Part, ...]:
+        """Shapes of families, and what may act anywhere."""
+        return tuple(part for part in self.parts if not is_law(part[0]))
 
     @property
     def label(self) -> str:
@@ -155,6 +165,11 @@ class Problem:
         low = np.array([p.low / p.typical for p in parameters])
         high = np.array([p.high / p.typical for p in parameters])
         return np.concatenate([-reach, -free, low]), np.concatenate([reach, free, high])
+
+    def prior(self, candidate: Candidate) -> Array:
+        """Inverse variance of each scaled unknown: nuisance and initial state one, effects that of their spread."""
+        own = [1.0 / p.spread**2 for p in self.effect_parameters(candidate)]
+        return np.concatenate([np.ones(self.fixed), own])
 
     def start(self, candidate: Candidate, fixed: Array | None, values: Sequence[float]) -> Array:
         """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""

@@ -55,7 +55,7 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
+def cost_of(residual: Array, rows: Mask | slice, x: Array, prior: Array) -> float:
     """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
     r = residual[rows]
     if not np.all(np.isfinite(r)):
@@ -63,7 +63,7 @@ def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
     limit = HUBER * robust_scale(r)
     magnitude = np.abs(r)
     rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
-    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + x[:fixed] @ x[:fixed])
+    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
 
 
 def robust_scale(residual: Array) -> float:
@@ -114,7 +114,7 @@ def fit(
 
 def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
     residual = problem.residual(candidate, x)
-    return Fit(candidate, x, cost_of(residual, rows, x, problem.fixed), residual, None, spent + 1)
+    return Fit(candidate, x, cost_of(residual, rows, x, problem.prior(candidate)), residual, None, spent + 1)
 
 
 def _spent(columns: Array, borrowed: Array | None) -> int:
@@ -178,8 +178,7 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     strength = 1.0 / (CORRELATION * (COST_FLOOR + rho.mean()))
     root = np.sqrt(w)
     A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
-    prior = np.zeros(len(state.x))
-    prior[: problem.fixed] = 1.0
+    prior = problem.prior(state.candidate)
     H = strength * (A.T @ A) + np.diag(prior + 1e-9)
     return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
 

@@ -18,7 +18,7 @@ from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
 from pneumo_ros.effects import library as own_effects
 from pneumo_ros.effects.configured import library_of
 from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.parameters import Active, is_law
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import Rig
@@ -94,7 +94,7 @@ def prepared(
 def _outside(library: Mapping[str, Effect]) -> list[str]:
     """Which effects of the library are not the package's own: a reader must know who competed."""
     folder = Path(str(own_effects.__file__)).parent
-    names = [name for name in library if not (folder / f"{name}.py").exists()]
+    names = [name for name in library if is_law(name) and not (folder / f"{name}.py").exists()]
     return [f"effects of your own that competed: {', '.join(names)}"] if names else []
 
 

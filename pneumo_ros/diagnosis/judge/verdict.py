@@ -16,6 +16,7 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Candidate
 from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.effects.parameters import ANYTHING, family_of
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ class Opinion:
 
 def name_of(candidate: Candidate) -> str:
     """Verdict word of a candidate; one effect at two places is still that effect."""
-    return "+".join(dict.fromkeys(sorted(effect for effect, _ in candidate.parts))) or "none"
+    return "+".join(sorted({family_of(effect) for effect, _ in candidate.parts} - {ANYTHING})) or "none"
 
 
 def judge(
