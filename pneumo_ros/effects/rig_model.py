@@ -29,6 +29,7 @@ from pneumo_ros.effects.contract import (
 )
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active, Parameter
+from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
 from pneumo_ros.plant.trim import trim
@@ -163,6 +164,10 @@ class RigModel:
             return tuple(SENSOR_PLACES[CHANNELS[channel]] for channel in channels_of(active.site))
         ends = [end for end, on in zip(("front", "rear"), ends_of(active.site), strict=True) if on]
         return tuple(dict.fromkeys(place.format(end=end) for place in effect.places for end in ends))
+
+    def anything_at(self, place: str) -> tuple[tuple[str, str], ...]:
+        """(effect, site) of what may act at a place; nothing where no term reaches."""
+        return tuple(part for part in anything_at(place) if part[0] in self.effects)
 
     def side(self, active: Active) -> str | None:
         """The end for an effect of an end; None for the whole rig and for sensors (their place names the channel)."""

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
@@ -51,7 +52,7 @@ def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fi
     missing = tuple(p for p in shapes_of(problem.model, one.candidate) if p not in one.candidate.parts)
     if not missing:
         return one
-    return _extended(problem, one, missing, iterations)
+    return with_parts(problem, one, missing, iterations)
 
 
 def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
@@ -60,21 +61,25 @@ def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
     return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
 
 
-def _extended(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int) -> Fit:
+def with_parts(
+    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None
+) -> Fit:
     """A structure with further parts, which start at nothing."""
     candidate = Candidate((*one.candidate.parts, *parts))
     count = len(problem.effect_parameters(Candidate(tuple(parts))))
     values = [*problem.values(one.candidate, one.x), *np.zeros(count)]
     start = problem.start(candidate, one.x[: problem.fixed], values)
-    found = fit(problem, candidate, start, one.jacobian, iterations=iterations)
+    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations)
     return found if found.cost < one.cost else one
 
 
-def reduced(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS) -> Fit:
+def reduced(
+    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS, rows: Mask | None = None
+) -> Fit:
     """A structure without some of its parts, fitted from what is left of it."""
     kept = tuple(part for part in one.candidate.parts if part not in parts)
     candidate = Candidate(kept)
-    return fit(problem, candidate, restricted(problem, one, candidate), None, iterations=iterations)
+    return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
 
 
 def restricted(problem: Problem, one: Fit, candidate: Candidate) -> np.ndarray:
@@ -110,7 +115,7 @@ def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
     """Each effect of the best structure against its rivals of the same place, and against its absence."""
     problem, found = contest.problem, best.fit
     for law in found.candidate.laws:
-        own = _of_law(found.candidate, law)
+        own = of_law(found.candidate, law)
         bare = reduced(problem, found, own, iterations=2)
         if bare.diverged or bare.jacobian is None:
             continue
@@ -118,7 +123,7 @@ def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
     for law in found.candidate.laws:
         if len(found.candidate.laws) < 2:
             break
-        without = reduced(problem, found, _of_law(found.candidate, law))
+        without = reduced(problem, found, of_law(found.candidate, law))
         more, less = score(problem, found), score(problem, without)
         if advantage(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
             found = without
@@ -126,7 +131,7 @@ def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
         contest.structures.append(found)
 
 
-def _of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
+def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
     """A law with its family's shape at the same site."""
     return tuple(p for p in candidate.parts if p[1] == law[1] and family_of(p[0]) == family_of(law[0]))
 
