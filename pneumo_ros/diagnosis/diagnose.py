@@ -13,7 +13,9 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
-from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_gap
+from pneumo_ros.diagnosis.judge.budgeted import budgeted
+from pneumo_ros.diagnosis.judge.closable import Closable, closable
+from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
@@ -27,6 +29,7 @@ from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
+LIKELY = 0.05  # share of a place from which a remainder is looked for there
 TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
@@ -81,7 +84,8 @@ def diagnose(
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)
     held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
-    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, walls)
+    evidence = outcome.closable.effects
+    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence, walls)
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
 
 
@@ -95,9 +99,13 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
-    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
+    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), None, None)
     before, after = _whereabouts(found, options.locate)
-    return replace(found, before=before, after=after)
+    tell(0.94, "what else could be closed")
+    rest = after if after is not None else before
+    likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
+    beside = closable(problem, best, holdout, total_floor(holdout), likely)
+    return replace(found, closable=beside, before=before, after=after)
 
 
 def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
@@ -132,6 +140,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         tell(0.97, "designing the next experiment")
         experiment = _next_experiment(outcome, opinion, group, options.experiment)
     cov = covariance(problem, best)
+    shares = budgeted(outcome, opinion, cov)
     tell(1.0, "done")
     hidden = _hidden(problem, contest)
     blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)
@@ -144,6 +153,10 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         gap=_gap(problem.model, holdout, outcome.runs),
         nuisance=nuisance_estimates(problem, best, cov),
         active=outcome.active,
+        budget=shares.entries,
+        refit_share=shares.refit,
+        remainder=shares.remainder,
+        floor_share=shares.floor,
         not_testable=hidden,
         experiment=experiment,
         edit=None if edit is None else edit_test(problem, edit, outcome.base, best),

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import Effect, Inputs, channels_of, ends_of
 from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of
-from pneumo_ros.effects.parameters import Active, family_of
+from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
 from pneumo_ros.effects.rig_model import Drive, RigModel
 from pneumo_ros.units import GAS_CONSTANT
 
@@ -25,29 +26,6 @@ THINNED = 8e-3  # s between rows that are evaluated
 BINS = 25
 STEP_TIME, STEP_ROWS = 0.3, 60  # s of a step response, and its points
 DIFFERENCE = 1e-3  # of a typical value, for the band
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Name and unit of a coordinate."""
-
-    name: str
-    unit: str
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A law as measured.
-
-    Attributes
-    ----------
-    x, y : coordinates
-    points : (B, 5) x, y, low and high end of the 90 % band, weight (share of the run in the bin)
-    """
-
-    x: Axis
-    y: Axis
-    points: Array
 
 
 class _Row(NamedTuple):
@@ -173,9 +151,9 @@ def _moves(model: RigModel, own: Sequence[Active]) -> Iterator[tuple[int, int, f
             yield part, k, size if active.values[k] + size <= p.high else -size
 
 
-def _bins(x: Array, step: bool) -> tuple[Array, Array, Array]:
+def _bins(x: Array, step: bool) -> tuple[NDArray[np.intp], Array, Array]:
     if step:
-        return np.arange(len(x)), x, np.full(len(x), 1.0 / len(x))
+        return np.arange(len(x), dtype=np.intp), x, np.full(len(x), 1.0 / len(x))
     low, high = np.quantile(x, [0.002, 0.998])
     edges = np.linspace(low, max(high, low + 1e-12), BINS + 1)
     bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
@@ -187,7 +165,7 @@ def _bins(x: Array, step: bool) -> tuple[Array, Array, Array]:
     return index[bins], centres, counts[kept] / len(x)
 
 
-def _binned(y: Array, bins: Array, count: int) -> Array:
+def _binned(y: Array, bins: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.bincount(bins, y, count) / np.maximum(np.bincount(bins, minlength=count), 1))
 
 
@@ -200,17 +178,20 @@ class _Run:
     period: float
 
 
-def _rows(
-    model: RigModel, record: Drive, nuisance: Array, active: Sequence[Active], site: str, total: bool
-) -> _Run:
+def _rows(model: RigModel, record: Drive, nuisance: Array, active: Sequence[Active], site: str, total: bool) -> _Run:
     states = model.states(record, nuisance, None, active)
     inputs = model.driven(Inputs(record.commands, record.road), record.period, active)[0]
     every = max(1, round(THINNED / record.period))
     index = np.arange(0, min(len(states), len(inputs.commands)) - 1, every)
     end = 1 if site == "rear" else 0
-    rows = [[_row(model, nuisance, active, states[i], inputs, i, e, record.period) for i in index] for e in (end, 1 - end)]
+    rows = [
+        [_row(model, nuisance, active, states[i], inputs, int(i), e, record.period) for i in index]
+        for e in (end, 1 - end)
+    ]
     if total:  # a shared term sees what both ends draw
-        rows[0] = [a._replace(air=a.air._replace(inflow=a.air.inflow + b.air.inflow)) for a, b in zip(*rows, strict=True)]
+        rows[0] = [
+            a._replace(air=a.air._replace(inflow=a.air.inflow + b.air.inflow)) for a, b in zip(*rows, strict=True)
+        ]
         rows[1] = [b._replace(air=b.air._replace(inflow=0.0)) for b in rows[1]]
     return _Run(rows[0], rows[1], every * record.period)
 
@@ -290,7 +271,7 @@ def _step_response(model: RigModel, parts: Sequence[Active]) -> tuple[Array, Arr
             acted = effect.inputs(given, period, ends_of("both"), part.values, None)[0]
             u = np.column_stack([acted.commands, acted.road])
     column = 4 if model.library[parts[0].effect].outputs is not None or "exciter" in parts[0].effect else 0
-    return np.arange(STEP_ROWS) * period, u[4:, column]
+    return np.asarray(np.arange(STEP_ROWS) * period), u[4:, column]
 
 
 def _openings(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[Array, Array]:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from pneumo_ros.arrays import Array
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -83,3 +85,26 @@ class Active:
     effect: str
     site: str
     values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Name and unit of a coordinate."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law as measured.
+
+    Attributes
+    ----------
+    x, y : coordinates
+    points : (B, 5) x, y, low and high end of the 90 % band, weight (share of the run in the bin)
+    """
+
+    x: Axis
+    y: Axis
+    points: Array

@@ -28,7 +28,7 @@ from pneumo_ros.effects.contract import (
     ends_of,
 )
 from pneumo_ros.effects.loading import load_library
-from pneumo_ros.effects.parameters import Active, Parameter
+from pneumo_ros.effects.parameters import Active, Curve, Parameter
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
@@ -168,6 +168,14 @@ class RigModel:
     def anything_at(self, place: str) -> tuple[tuple[str, str], ...]:
         """(effect, site) of what may act at a place; nothing where no term reaches."""
         return tuple(part for part in anything_at(place) if part[0] in self.effects)
+
+    def curve(
+        self, record: Drive, nuisance: Array, active: Sequence[Active], own: Sequence[Active], covariance: Array
+    ) -> Curve | None:
+        """Curve of one effect's parts along a record, see :mod:`pneumo_ros.effects.curves`."""
+        from pneumo_ros.effects.curves import curve_of
+
+        return curve_of(self, record, nuisance, active, own, covariance)
 
     def side(self, active: Active) -> str | None:
         """The end for an effect of an end; None for the whole rig and for sensors (their place names the channel)."""

@@ -88,10 +88,7 @@ class Problem:
     def weight(self) -> Array:
         """(n, C) 1/sigma, zero where no sample is there: noise after averaging and the model-form floor together."""
         form = np.vstack(
-            [
-                np.tile(MODEL_FORM_FLOOR * scale_of(r), (len(n), 1))
-                for r, n in zip(self.records, self._real, strict=True)
-            ]
+            [np.tile(form_of(r) * scale_of(r), (len(n), 1)) for r, n in zip(self.records, self._real, strict=True)]
         )
         sigma = np.hypot(self.noise, form)
         there = np.vstack([real.any(axis=1) for real in self._real])
@@ -228,6 +225,11 @@ class Problem:
     def residual(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) measured - predicted, in sigmas."""
         return (self.measured - self.predict(candidate, x)) * self.weight
+
+
+def form_of(record: Any) -> float:
+    """Share of a channel's std that the maker's model form is worth, with the floor of any model of this kind."""
+    return float(np.hypot(MODEL_FORM_FLOOR, getattr(record, "model_form", 0.0)))
 
 
 def _between(rows: Array, count: int) -> Array:

@@ -172,4 +172,4 @@ class FlexibleSearch:
             return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
         gain = flexible_gain(model, fit, holdout, nuisance, active, self.first)
         flat = not gain.places
-        return Whereabouts((), float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)
+        return Whereabouts(gain.shares, float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)

@@ -16,11 +16,12 @@ import numpy as np
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
+from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.growth import of_law, reduced, with_parts
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS = 4  # iterations of a fit with something added or taken away
-REMAINDERS = 2  # places outside the structure at which a remainder is looked for
+TOGETHER = 3  # places at which a remainder is looked for together
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,13 @@ class Remainder:
 
     Attributes
     ----------
-    place : of the contract
+    places : of the contract
     parts : what was added there
     fit : the structure with it, on all blocks
     left : held-out gap left, mean square above floor and form
     """
 
-    place: str
+    places: tuple[str, ...]
     parts: tuple[Part, ...]
     fit: Fit
     left: float
@@ -74,10 +75,11 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Closable:
-    """Evidence for each effect of the best structure, and its remainders, the largest first."""
+    """Evidence for each effect of the best structure, its remainders, the largest first, and what it leaves itself."""
 
     effects: tuple[EffectEvidence, ...]
     remainders: tuple[Remainder, ...]
+    own: float = 0.0
 
 
 def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Sequence[str]) -> Closable:
@@ -104,11 +106,11 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         without = above(problem, bare, holdout, floor)
         evidence.append(EffectEvidence(law, where, without, own, added(where).left))
-    seen = {place for where in remainders for place in where}
-    for place in [p for p in places if p not in seen][:REMAINDERS]:
-        added((place,))
+    if places:  # together, what is left may need them all; alone, one of them may do
+        added(tuple(places[:TOGETHER]))
+        added((places[0],))
     found = sorted((r for r in remainders.values() if r.left < own), key=lambda r: r.left)
-    return Closable(tuple(evidence), tuple(found))
+    return Closable(tuple(evidence), tuple(found), own)
 
 
 def above(problem: Problem, one: Fit, holdout: Any, floor: float) -> float:
@@ -116,15 +118,14 @@ def above(problem: Problem, one: Fit, holdout: Any, floor: float) -> float:
     return max(held_by(problem, one, holdout).total ** 2 - floor**2, 0.0)
 
 
-def _anything(
-    problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], own: float
-) -> Remainder:
-    at = getattr(problem.model, "anything_at", None)
-    parts = tuple(dict.fromkeys(p for place in where for p in (at(place) if at else ())))
+def _anything(problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], own: float) -> Remainder:
+    model = problem.model
+    at = [model.anything_at(place) for place in where] if isinstance(model, HasCeilings) else []
+    parts = tuple(dict.fromkeys(part for parts in at for part in parts))
     if not parts:
-        return Remainder(where[0], (), best, own)
+        return Remainder(where, (), best, own)
     found = with_parts(problem, best, parts, STEPS, _all(problem))
-    return Remainder(where[0], parts, found, above(problem, found, holdout, floor))
+    return Remainder(where, parts, found, above(problem, found, holdout, floor))
 
 
 def _fitted(problem: Problem, one: Fit) -> Fit:

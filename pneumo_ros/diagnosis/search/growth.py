@@ -61,9 +61,7 @@ def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
     return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
 
 
-def with_parts(
-    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None
-) -> Fit:
+def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
     """A structure with further parts, which start at nothing."""
     candidate = Candidate((*one.candidate.parts, *parts))
     count = len(problem.effect_parameters(Candidate(tuple(parts))))
