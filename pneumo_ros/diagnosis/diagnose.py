@@ -30,7 +30,6 @@ from pneumo_ros.effects.parameters import Active
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
 LIKELY = 0.05  # share of a place from which a remainder is looked for there
-TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
@@ -175,11 +174,9 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
 
 
 def _on_held_out(outcome: Outcome) -> HeldOutGaps:
-    floor = total_gap(noise_floor(outcome.holdout))
-    before, after, runs = outcome.before, outcome.after, outcome.runs
-    told = before is not None and before.left > TELLING
-    kept = after.kept if told and after is not None else None
-    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
+    floor, runs = total_floor(outcome.holdout), outcome.runs
+    form = float(getattr(outcome.holdout, "model_form", 0.0))
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, form / floor)
 
 
 def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
@@ -228,6 +225,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
+    out |= {f"closes:{one.family}": one.closes for one in outcome.closable.effects}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 
 

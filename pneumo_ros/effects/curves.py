@@ -74,7 +74,8 @@ TERMS: dict[str, tuple[Axis, Axis, Reader]] = {
         lambda r, y: (_of(r, lambda s: s.air.supply_temperature - s.air.temperature), _heat(r, y)),
     ),
     "tyre_damping": (
-        Axis("compression rate", "m/s"), Axis("force up on the axle", "N"), lambda r, y: (_of(r, lambda s: s.tyre.rate), y)
+        Axis("compression rate", "m/s"), Axis("force up on the axle", "N"),
+        lambda r, y: (_of(r, lambda s: s.tyre.rate), y),
     ),
     "tyre_liftoff": (
         Axis("tyre compression", "m"), Axis("force up on the axle", "N"),

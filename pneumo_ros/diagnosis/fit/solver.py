@@ -79,22 +79,26 @@ def fit(
     rows: Mask | None = None,
     iterations: int = 10,
     probe: bool = False,
+    shared: int | None = None,
 ) -> Fit:
     """Best unknowns from one start.
 
     Parameters
     ----------
     start : scaled unknowns
-    jacobian : (n, C, >= fixed) sensitivities whose fixed columns serve the first step
+    jacobian : (n, C, >= shared) sensitivities whose first columns serve the first step
     rows : fitted samples; the problem's by default
-    probe : borrow the fixed columns for every step: a tenth of the cost, for a first look at a candidate
+    probe : borrow those columns for every step: a tenth of the cost, for a first look at a candidate
+    shared : how many of them are of the same unknowns; by default the fixed ones, more where the candidate is the
+        jacobian's own with further parts
     """
     rows = problem.fitted if rows is None else rows
     bounds = problem.bounds(candidate)
     state = _evaluate(problem, candidate, np.clip(start, *bounds), rows)
     if state.diverged:
         return state
-    borrowed = None if jacobian is None else jacobian[:, :, : problem.fixed]
+    shared = problem.fixed if shared is None else shared
+    borrowed = None if jacobian is None else jacobian[:, :, :shared]
     damping, failed = START_DAMPING, False
     for _ in range(iterations):
         columns = _jacobian(problem, state, borrowed)
@@ -107,7 +111,7 @@ def fit(
                 break
             failed = True
         if not probe:
-            borrowed = columns[:, :, : problem.fixed] if moved < NEAR and gained >= TOLERANCE else None
+            borrowed = columns[:, :, :shared] if moved < NEAR and gained >= TOLERANCE else None
         damping = damping if gained >= TOLERANCE else START_DAMPING
     return state
 

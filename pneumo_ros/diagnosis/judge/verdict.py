@@ -56,14 +56,14 @@ class HeldOutGaps:
 
     Attributes
     ----------
-    refit, chosen : free-run gaps of the refit and of the chosen structure, in noise floors
-    kept : share of the equations' gap that the chosen structure leaves to flexible corrections; None where the
-        equations show too little of it
+    refit, chosen : free-run gaps of the refit and of the chosen structure over the floor that sensors and the stated
+        model form leave
+    form : what the maker holds the model form to be worth, over the same floor; 0 where nothing is stated
     """
 
     refit: float
     chosen: float
-    kept: float | None = None
+    form: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -127,13 +127,16 @@ def judge(
         unknown = unexplained(refit.level, held, calibration)
         scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
-    worse = held.chosen >= held.refit
+    worse = held.chosen >= held.refit or (held.form > 0.0 and held.refit <= 1.0)
     trust = {one.law: 0.0 if worse else credit(one, held, at_bounds, calibration) for one in evidence}
-    unknown = 1.0 - max(trust.values(), default=0.0)
-    scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
+    trusted = max(trust.values(), default=0.0)
+    unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)
+    scaled = {candidate: p * trusted for candidate, p in named.items()}
+    scaled[refit.fit.candidate] += 1.0 - trusted - unknown
     effects = {law: value * _in_structure(named, law) for law, value in trust.items()}
     names = sorted({family_of(law[0]) for law, value in trust.items() if value > 0.5})
-    return Opinion(chosen, "+".join(names) or "unknown", scaled, unknown, effects)
+    nameless = "unknown" if unknown >= scaled[refit.fit.candidate] else "none"
+    return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 
 
 def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: Calibration) -> float:

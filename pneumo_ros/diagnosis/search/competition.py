@@ -299,7 +299,7 @@ def probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Pro
     for promise in promised:
         candidate = Candidate((*base.candidate.parts, *promise.parts))
         start = problem.start(candidate, base.x[: problem.fixed], [*own, *promise.values])
-        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True)
+        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
         values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
         ranked.append((one.cost, promise if one.diverged else replace(promise, values=values)))
     return [promise for _, promise in sorted(ranked, key=lambda item: item[0])]
@@ -312,7 +312,7 @@ def short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tup
         contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
         values = [*problem.values(base.candidate, base.x), *promise.values]
         start = problem.start(candidate, base.x[: problem.fixed], values)
-        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short, shared=len(base.x))
         one = _rescued(problem, one, contest.effort.short)
         if one.diverged:
             contest.lost.append(candidate.label)

@@ -1,8 +1,8 @@
 """Beyond laws and pairs: shapes beside laws, further effects one at a time, exchange, and elimination.
 
 A law of the library is seldom the rig's own. So each structure that leads is fitted once more with the shapes of its
-families (:mod:`pneumo_ros.effects.shapes`) beside its laws, and a further effect counts only for what those cannot close:
-the misfit of a law must not pass for a second effect.
+families (:mod:`pneumo_ros.effects.shapes`) beside its laws, and a further effect counts only for what those cannot
+close: the misfit of a law must not pass for a second effect.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 MOST = 6  # effects in a structure
 SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
 SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
-PROBED, SHORT, FINISHED = 12, 3, 2  # further effects probed, fitted shortly, fitted to the end
+PROBED, SHORT, FINISHED = 10, 3, 2  # further effects probed, fitted shortly, fitted to the end
 STEPS = 5
 
 
 def grow(contest: Contest, limits: Thresholds) -> None:
-    """Fill ``contest.structures``: leading singles and pairs with their shapes, and what grows from the best of them."""
+    """Fill ``contest.structures``: leading singles and pairs with their shapes, and what grows from the best."""
     contest.progress(0.82, "shapes")
     for found, count in zip((contest.singles, contest.pairs), SHAPED, strict=True):
         contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
@@ -67,7 +67,7 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
     count = len(problem.effect_parameters(Candidate(tuple(parts))))
     values = [*problem.values(one.candidate, one.x), *np.zeros(count)]
     start = problem.start(candidate, one.x[: problem.fixed], values)
-    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations)
+    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
     return found if found.cost < one.cost else one
 
 
@@ -137,7 +137,7 @@ def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
 def _exchanged(contest: Contest, found: Fit, bare: Fit, law: Part) -> Fit:
     """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
     problem, effort = contest.problem, contest.effort
-    others = [p for p in bare.candidate.laws]
+    others = bare.candidate.laws
     rivals = [p for p in all_parts(problem) if _rival(problem, law, p) and all(compatible((o, p)) for o in others)]
     promised = promises(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(contest, bare, probed(problem, bare, promised)[:1], (0.9, 0.9)):

@@ -1,8 +1,8 @@
 """Atoms: the simple laws whose sums make a family's shape, and the effects that are made of them.
 
 A compiled term holds all atoms of a place and reads their amplitudes; a family's shape is an effect that fits some of
-them, those of a kind with one sign (a cone: whatever law of the kind lies in it, sums of laws as well). ``anything`` at a
-place may use them all with either sign: the ceiling of what can be closed there.
+them, those of a kind with one sign (a cone: whatever law of the kind lies in it, sums of laws as well). ``anything`` at
+a place may use them all with either sign: the ceiling of what can be closed there.
 """
 
 from __future__ import annotations

@@ -75,7 +75,8 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     return (
         _slid(z[0], move / 6e-5), _slid(z[1], move / 3e-4), _slid(z[2], move / 1.2e-3), _slid(z[3], move / 4e-3),
         _slid(z[4], move / 1.2e-2),
-        h + (z[5] - h) * math.exp(-dt / 0.02), h + (z[6] - h) * math.exp(-dt / 0.1), h + (z[7] - h) * math.exp(-dt / 0.5),
+        h + (z[5] - h) * math.exp(-dt / 0.02), h + (z[6] - h) * math.exp(-dt / 0.1),
+        h + (z[7] - h) * math.exp(-dt / 0.5),
     )  # fmt: skip
 
 
@@ -123,7 +124,7 @@ EFFECTS = (
     FORCE.shape(
         "bellows_hysteresis", [f"slider {s:g} m" for s in SLACKS[2:]], "hysteresis of any law: sliders of every length"
     ),
-    FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height, may lose energy"),
+    FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height and may damp"),
     FORCE.shape("effective_area_error", ["area"], "an area error of any law over height and pressure"),
     FORCE.anything(),
 )  # fmt: skip

@@ -1,8 +1,8 @@
 """Atoms of what happens to a signal on its way: valves, exciter and sensors.
 
-A slow part is a mixture of lags and delays with nonnegative shares (an impulse response that never turns sign); a dead
-zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a polynomial
-of its own reading.
+A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead
+zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a
+polynomial of its own reading.
 """
 
 from __future__ import annotations
@@ -147,8 +147,7 @@ ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length", [*LAG_NAMES, DELAY_NAMES[0]],
            [*SLOW, LATE[0]], False),
-    _valve("transport_delay.shape", "a late valve: delays of every length", DELAY_NAMES, LATE, False),
-    _valve("valve_deadband.shape", "a dead zone of any law: hard or soft, with or without play", ZONE_NAMES, ZONES, True),
+    _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
     Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),

@@ -1,4 +1,4 @@
-"""Atoms of a force between axle and ground: losses of the tyre, lost contact, another stiffness. Positive up on the axle."""
+"""Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness."""
 
 from __future__ import annotations
 
