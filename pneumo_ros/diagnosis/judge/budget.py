@@ -1,8 +1,9 @@
 """The budget of the gap: which share of the nominal held-out gap each effect makes, and what is left.
 
-Shares are of the squared nominal gap; what sensors and the model's stated form leave is the floor's share. Nuisance parameters and
-effects are the players of a game whose value is the gap that they close together; a player's share is the mean over all
-orders in which they can be added (Shapley 1953), so that shares add up whatever the effects do to each other.
+Shares are of the squared nominal gap; what sensors and the model's stated form leave is the floor's share. Nuisance
+parameters and effects are the players of a game whose value is the gap that they close together; a player's share is
+the mean over all orders in which they can be added (Shapley, "A value for n-person games", 1953), so that shares add up
+whatever the effects do to each other.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The budget as the diagnosis tells it: shares with laws, probabilities and measured curves, and the remainder's place."""
+"""The budget as the diagnosis tells it: shares, laws, probabilities, measured curves, and the remainder's place."""
 
 from __future__ import annotations
 

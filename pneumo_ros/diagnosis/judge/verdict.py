@@ -1,7 +1,7 @@
 """From scores to a verdict with a probability for each effect.
 
-Two questions in turn. How much better does a structure fit than the next, on the logs that were fitted and on their kept
-blocks? And of each effect of the best one: does its family close most of what can be closed at its place on the
+Two questions in turn. How much better does a structure fit than the next, on the logs that were fitted and on their
+kept blocks? And of each effect of the best one: does its family close most of what can be closed at its place on the
 held-out log, or does something else act there? No share of the misfit decides: a right law may leave more of it than a
 wrong one, but whatever may act at the place then closes no more (:mod:`pneumo_ros.diagnosis.judge.closable`). The
 held-out log never chooses between names.
@@ -148,7 +148,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: 
 
 
 def _in_structure(named: Mapping[Candidate, float], law: Part) -> float:
-    """Probability that a structure holds an effect's family where its law acts, the refit and all finalists together."""
+    """Probability that a structure holds a law's family, the refit and all finalists together."""
     return min(1.0, sum(p for c, p in named.items() if any(family_of(e) == family_of(law[0]) for e, _ in c.laws)))
 
 
