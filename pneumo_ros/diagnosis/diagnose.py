@@ -13,8 +13,9 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
+from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
-from pneumo_ros.diagnosis.judge.closable import Closable, closable
+from pneumo_ros.diagnosis.judge.closable import Closable, EffectEvidence, closable
 from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
@@ -79,12 +80,14 @@ def diagnose(
     options = options or Options()
     tell = progress or (lambda share, what: None)
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
-    grow(contest, options.limits)
+    grow(contest, options.limits, options.pairs)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)
     held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
-    evidence = outcome.closable.effects
+    evidence = _weighed(outcome)
     opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence, walls)
+    if opinion.verdict == "none":  # what nothing speaks for is not told, and not saved
+        outcome = _without_effects(outcome)
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
 
 
@@ -98,13 +101,31 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
-    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), None, None)
+    floor = total_floor(holdout)
+    shares = budget(problem, best, holdout, floor)
+    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), shares, None, None)
     before, after = _whereabouts(found, options.locate)
     tell(0.94, "what else could be closed")
     rest = after if after is not None else before
     likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
-    beside = closable(problem, best, holdout, total_floor(holdout), likely)
+    beside = closable(problem, best, holdout, floor, likely)
     return replace(found, closable=beside, before=before, after=after)
+
+
+def _weighed(outcome: Outcome) -> tuple[EffectEvidence, ...]:
+    """The evidence of each effect with its share of what the refit leaves."""
+    nominal, refit = (outcome.runs[name].total ** 2 for name in ("nominal", "refit"))
+    left = max(refit - total_floor(outcome.holdout) ** 2, 1e-12)
+    shares = outcome.budget.effects
+    return tuple(replace(e, share=shares[e.law].value * nominal / left) for e in outcome.closable.effects)
+
+
+def _without_effects(outcome: Outcome) -> Outcome:
+    """The outcome as if nothing had been chosen."""
+    floor, base = total_floor(outcome.holdout), outcome.base
+    return replace(outcome, chosen=outcome.refit, best=base, closable=Closable((), ()), after=outcome.before,
+                   budget=budget(outcome.problem, base, outcome.holdout, floor),
+                   runs={**outcome.runs, "best": outcome.runs["refit"]})  # fmt: skip
 
 
 def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:

@@ -11,9 +11,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance
-from pneumo_ros.diagnosis.judge.budget import Budget, budget
+from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Remainder as Closing
-from pneumo_ros.diagnosis.judge.held_out import total_floor
 from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import HasCurves
@@ -37,8 +36,7 @@ class Shares:
 
 def budgeted(outcome: Outcome, opinion: Opinion, cov: Array) -> Shares:
     """Shares of the best structure; ``cov`` of its scaled unknowns."""
-    problem, best = outcome.problem, outcome.best
-    found = budget(problem, best, outcome.holdout, total_floor(outcome.holdout))
+    best, found = outcome.best, outcome.budget
     entries = [_entry(outcome, opinion, found, law, cov) for law in best.candidate.laws]
     ranked = tuple(sorted(entries, key=lambda e: -e.share))
     return Shares(ranked, found.refit, _remainder(outcome, found), found.floor)

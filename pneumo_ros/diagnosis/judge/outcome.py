@@ -9,6 +9,7 @@ from typing import Any
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
 from pneumo_ros.diagnosis.search.competition import Contest
@@ -48,6 +49,7 @@ class Outcome:
     holdout : the held-out record
     runs : "nominal", "refit" and "best" on it
     closable : what could be closed at the places of the best structure's effects, and elsewhere
+    budget : shares of the nominal gap
     before, after : places of what the nominal and the best structure leave; None where nobody looked
     """
 
@@ -60,6 +62,7 @@ class Outcome:
     holdout: Any
     runs: Mapping[str, HeldOut]
     closable: Closable
+    budget: Budget
     before: Whereabouts | None
     after: Whereabouts | None
 

@@ -35,6 +35,7 @@ class Calibration:
     ceiling : how many times what the ceiling leaves the whole structure may leave at that
     steepness : exponent of these transitions
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
+    least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     walls : parameters at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
@@ -47,6 +48,7 @@ class Calibration:
     steepness: float = 4.0
     real: float = 2.5
     walls: float = 1.3
+    least: float = 0.015
     held_real: float = 3.0
 
 
@@ -142,7 +144,7 @@ def judge(
 def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: Calibration) -> float:
     """Probability that an effect of the structure is what acts at its place, 0..1."""
     c = calibration
-    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls]
+    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls, c.least / max(one.share, 1e-9)]
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

@@ -25,15 +25,16 @@ SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
 SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
 PROBED, SHORT, FINISHED = 10, 3, 2  # further effects probed, fitted shortly, fitted to the end
 STEPS = 5
+IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
 
 
-def grow(contest: Contest, limits: Thresholds) -> None:
+def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
     """Fill ``contest.structures``: leading singles and pairs with their shapes, and what grows from the best."""
     contest.progress(0.82, "shapes")
     for found, count in zip((contest.singles, contest.pairs), SHAPED, strict=True):
         contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
     best = _selected(contest, limits)
-    while 0 < best.size < MOST and room_for_more(contest):
+    while further and 0 < best.size < MOST and room_for_more(contest):
         contest.progress(0.84 + 0.01 * best.size, f"beside {best.fit.candidate.label}")
         contest.structures += _one_more(contest, best.fit)
         better = _selected(contest, limits)
@@ -44,7 +45,7 @@ def grow(contest: Contest, limits: Thresholds) -> None:
         _refine(contest, best, limits)
     best = _selected(contest, limits)
     if best.size and best.fit.candidate.shapes:
-        contest.structures.append(_without_idle_shapes(contest.problem, best.fit))
+        contest.structures.append(_without_idle_shapes(contest, best.fit))
 
 
 def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
@@ -156,11 +157,19 @@ def _rival(problem: Problem, law: Part, other: Part) -> bool:
     return one[:1] == two[:1]
 
 
-def _without_idle_shapes(problem: Problem, found: Fit) -> Fit:
+def _without_idle_shapes(contest: Contest, found: Fit) -> Fit:
     """The structure without those shapes that the kept blocks do not miss: there the law is the rig's."""
+    problem = contest.problem
+    for bare in (one for one in contest.laws if one.candidate.parts == found.candidate.laws):
+        if _does(problem, bare, found):
+            return bare
     for part in found.candidate.shapes:
         less = reduced(problem, found, (part,), iterations=STEPS)
-        before, after = score(problem, found), score(problem, less)
-        if after.level <= before.level * (1.0 + SAME) + 0.02 and after.price < before.price + 1.0:
-            found = less
+        found = less if _does(problem, less, found) else found
     return found
+
+
+def _does(problem: Problem, less: Fit, more: Fit) -> bool:
+    """Whether a smaller structure predicts the kept blocks as well and costs no more."""
+    one, other = score(problem, less), score(problem, more)
+    return one.level <= other.level * (1.0 + SAME) + IDLE and one.price < other.price + 1.0
