@@ -102,7 +102,7 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
     floor = total_floor(holdout)
-    shares = budget(problem, best, holdout, floor)
+    shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
     found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), shares, None, None)
     before, after = _whereabouts(found, options.locate)
     tell(0.94, "what else could be closed")
@@ -122,10 +122,11 @@ def _weighed(outcome: Outcome) -> tuple[EffectEvidence, ...]:
 
 def _without_effects(outcome: Outcome) -> Outcome:
     """The outcome as if nothing had been chosen."""
-    floor, base = total_floor(outcome.holdout), outcome.base
+    base, runs, holdout = outcome.base, outcome.runs, outcome.holdout
+    gaps = (total_floor(holdout), runs["nominal"].total, runs["refit"].total)
     return replace(outcome, chosen=outcome.refit, best=base, closable=Closable((), ()), after=outcome.before,
-                   budget=budget(outcome.problem, base, outcome.holdout, floor),
-                   runs={**outcome.runs, "best": outcome.runs["refit"]})  # fmt: skip
+                   budget=budget(outcome.problem, base, holdout, *gaps),
+                   runs={**runs, "best": runs["refit"]})  # fmt: skip
 
 
 def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
