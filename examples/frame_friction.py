@@ -26,7 +26,6 @@ from scipy.signal import savgol_filter
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
-from pneumo_ros.diagnosis.judge.verdict import Calibration
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
@@ -35,10 +34,6 @@ from pneumo_ros.errors import InputError
 FLOOR_NOISE = 2e-6  # m, laser: what fourth differences of the log show, times four for what is not white
 SUBSTEPS = 4  # RK4 at 1 ms: friction that turns over within 0.5 mm/s needs steps below 3 ms
 TURNOVER = 5e-4  # m/s over which dry friction changes sign: below the pixel of any rig, above what stiffens the solver
-
-# How much of the misfit a right law may leave: the default is calibrated on simulated half cars, whose laws are cleaner
-# than a real disc on a real wall.
-REAL = Calibration(leftover=0.4, leftover_held=0.4)
 
 PARAMETERS = (
     Parameter("mass", "kg", 3.0799, 0.03),
@@ -201,7 +196,7 @@ def diagnose_frame(folder: Path, progress: Any | None = None) -> Diagnosis:
     record = read_record(folder)
     half = len(record.measured) // 2
     parts = record.slice(0, half), record.slice(half, len(record.measured))
-    return diagnose(Frame(), [parts[0]], parts[1], Options(calibration=REAL), progress)
+    return diagnose(Frame(), [parts[0]], parts[1], Options(), progress)
 
 
 def main() -> None:

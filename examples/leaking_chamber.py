@@ -24,7 +24,6 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
 from pneumo_ros.diagnosis.fit.problem import AVERAGED, REACH
-from pneumo_ros.diagnosis.judge.verdict import Calibration
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.selection import Thresholds
@@ -40,10 +39,6 @@ WANDER = 300.0  # Pa: how the reading of the tight chamber wanders about its own
 # Seventy seconds of one slow channel are worth about ten independent readings, against some hundred of a half car's
 # log; the cost by which an effect must win shrinks with them.
 EVIDENCE = Thresholds(first_cost=6.0)
-# How much of the misfit a right law may leave: the default is calibrated on simulated half cars, whose laws are cleaner
-# than a real chamber's, whose reading wanders by seconds.
-REAL = Calibration(leftover=0.4, leftover_held=0.4)
-
 # The fit keeps a parameter within REACH standard deviations: the bound is what still counts as tight.
 PARAMETERS = (Parameter("seepage", "1/s", 0.0, TIGHT / HOLD / REACH),)
 
@@ -163,7 +158,7 @@ def diagnose_chamber(path: Path) -> Diagnosis:
     record = read_record(path)
     cut = len(record.measured) // 2
     late = record.slice(cut, len(record.measured)).averaged(round(1.0 / record.period))
-    return diagnose(Chamber(), [record.slice(0, cut)], late, Options(pairs=False, limits=EVIDENCE, calibration=REAL))
+    return diagnose(Chamber(), [record.slice(0, cut)], late, Options(pairs=False, limits=EVIDENCE))
 
 
 def main() -> None:

@@ -147,6 +147,7 @@ def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: S
         console.print("not told apart by this log: " + ", ".join(rivals))
     console.print(how_far(summary), highlight=False)
     if told:
+        _show_budget(console, summary)
         _show_ranking(console, found)
     if found.edit is not None:
         _show_edit(console, found.edit)
@@ -154,6 +155,18 @@ def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: S
         console.print(f"note: {note}", highlight=False, markup=False)
     for step in next_steps(summary, [log.name for log in fit]):
         console.print(f"next: {step}", highlight=False, markup=False)
+
+
+def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
+    from pneumo_ros.cli.tables import simple_table
+    from pneumo_ros.diagnosis.report.budget import budget_rows
+
+    rows = []
+    for row in budget_rows(summary):
+        entry = row.get("entry", {})
+        probability = f"{entry['probability']:.2f}" if entry else ""
+        rows.append((row["words"], f"{row['share']:.1%}", entry.get("law", ""), probability))
+    console.print(simple_table(("of the gap", "share", "law", "probability"), rows))
 
 
 def _show_ranking(console: Console, found: Diagnosis) -> None:

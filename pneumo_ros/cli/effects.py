@@ -26,10 +26,10 @@ def effects(
     """What the diagnosis can name, and how to check it by hand on the rig."""
     from rich.console import Console
 
-    from pneumo_ros.effects.loading import load_library
+    from pneumo_ros.effects.loading import laws_of, load_library
     from pneumo_ros.errors import not_one_of
 
-    library, console = load_library(file or ()), Console(highlight=False)
+    library, console = laws_of(load_library(file or ())), Console(highlight=False)
     if effect is None:
         _list(console, library)
         return

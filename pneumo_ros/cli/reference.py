@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
-from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.sheet import effects_page
 from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
@@ -51,7 +51,7 @@ def parameters_table(table: tuple[Parameter, ...]) -> str:
 def documents() -> dict[str, str]:
     """File name below docs/ -> text."""
     parts = [f"## {node}\n\n{parameters_table(table)}" for node, table in node_tables().items()]
-    page = EFFECTS_HEAD + effects_page(load_library())
+    page = EFFECTS_HEAD + effects_page(laws_of(load_library()))
     return {
         "effects.md": page,
         "topics.md": TOPICS_HEAD + topics_table(),

@@ -13,7 +13,10 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
-from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_gap
+from pneumo_ros.diagnosis.judge.budget import budget
+from pneumo_ros.diagnosis.judge.budgeted import budgeted
+from pneumo_ros.diagnosis.judge.closable import Closable, EffectEvidence, closable
+from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
@@ -21,12 +24,13 @@ from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
 from pneumo_ros.diagnosis.search.competition import Contest, Effort, Progress, compete
+from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
-TELLING = 2.0  # null standard deviations that the equations must show of a gap before they judge a structure
+LIKELY = 0.05  # share of a place from which a remainder is looked for there
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
@@ -76,10 +80,14 @@ def diagnose(
     options = options or Options()
     tell = progress or (lambda share, what: None)
     contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
+    grow(contest, options.limits, options.pairs)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)
     held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
-    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, walls)
+    evidence = _weighed(outcome)
+    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence, walls)
+    if opinion.verdict == "none":  # what nothing speaks for is not told, and not saved
+        outcome = _without_effects(outcome)
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
 
 
@@ -93,9 +101,32 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
     runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
-    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, None, None)
+    floor = total_floor(holdout)
+    shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
+    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), shares, None, None)
     before, after = _whereabouts(found, options.locate)
-    return replace(found, before=before, after=after)
+    tell(0.94, "what else could be closed")
+    rest = after if after is not None else before
+    likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
+    beside = closable(problem, best, holdout, floor, likely)
+    return replace(found, closable=beside, before=before, after=after)
+
+
+def _weighed(outcome: Outcome) -> tuple[EffectEvidence, ...]:
+    """The evidence of each effect with its share of what the refit leaves."""
+    nominal, refit = (outcome.runs[name].total ** 2 for name in ("nominal", "refit"))
+    left = max(refit - total_floor(outcome.holdout) ** 2, 1e-12)
+    shares = outcome.budget.effects
+    return tuple(replace(e, share=shares[e.law].value * nominal / left) for e in outcome.closable.effects)
+
+
+def _without_effects(outcome: Outcome) -> Outcome:
+    """The outcome as if nothing had been chosen."""
+    base, runs, holdout = outcome.base, outcome.runs, outcome.holdout
+    gaps = (total_floor(holdout), runs["nominal"].total, runs["refit"].total)
+    return replace(outcome, chosen=outcome.refit, best=base, closable=Closable((), ()), after=outcome.before,
+                   budget=budget(outcome.problem, base, holdout, *gaps),
+                   runs={**runs, "best": runs["refit"]})  # fmt: skip
 
 
 def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
@@ -130,6 +161,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         tell(0.97, "designing the next experiment")
         experiment = _next_experiment(outcome, opinion, group, options.experiment)
     cov = covariance(problem, best)
+    shares = budgeted(outcome, opinion, cov)
     tell(1.0, "done")
     hidden = _hidden(problem, contest)
     blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)
@@ -142,6 +174,10 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         gap=_gap(problem.model, holdout, outcome.runs),
         nuisance=nuisance_estimates(problem, best, cov),
         active=outcome.active,
+        budget=shares.entries,
+        refit_share=shares.refit,
+        remainder=shares.remainder,
+        floor_share=shares.floor,
         not_testable=hidden,
         experiment=experiment,
         edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
@@ -160,11 +196,9 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
 
 
 def _on_held_out(outcome: Outcome) -> HeldOutGaps:
-    floor = total_gap(noise_floor(outcome.holdout))
-    before, after, runs = outcome.before, outcome.after, outcome.runs
-    told = before is not None and before.left > TELLING
-    kept = after.kept if told and after is not None else None
-    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, kept)
+    floor, runs = total_floor(outcome.holdout), outcome.runs
+    form = float(getattr(outcome.holdout, "model_form", 0.0))
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, form / floor)
 
 
 def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
@@ -213,6 +247,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
+    out |= {f"closes:{one.family}": one.closes for one in outcome.closable.effects}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
+from pneumo_ros.effects.parameters import Active, Curve, EffectParameter, Parameter
 
 
 class EffectLike(Protocol):
@@ -87,3 +87,21 @@ class Model(Protocol):
 
     def side(self, active: Active) -> str | None:
         """ "front", "rear", "both", or None where sides make no sense."""
+
+
+@runtime_checkable
+class HasCeilings(Protocol):
+    """A model that knows what may act at a place, whatever it is: the ceiling of what can be closed there."""
+
+    def anything_at(self, place: str) -> tuple[tuple[str, str], ...]:
+        """(effect, site) of the flexible effects of a place; none where no term reaches."""
+
+
+@runtime_checkable
+class HasCurves(Protocol):
+    """A model that shows an effect over its own coordinate."""
+
+    def curve(
+        self, record: Any, nuisance: Array, active: Sequence[Active], own: Sequence[Active], covariance: Array
+    ) -> Curve | None:
+        """Curve of one effect's parts along a record; ``covariance`` of their values (SI). None where it has none."""

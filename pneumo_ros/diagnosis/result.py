@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
 ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
@@ -112,6 +112,65 @@ class Gap:
 
 
 @dataclass(frozen=True)
+class BudgetEntry:
+    """One effect's part of the nominal held-out gap.
+
+    Attributes
+    ----------
+    effects : ids of the mechanism
+    side, places : where it acts
+    share, share_ci90 : of the squared nominal gap, averaged over the orders in which effects can be added
+    law : id of the library's law, or "differs" where the family's shape closes more than its law
+    probability : that the effect is in the structure, whatever else is
+    curve : the law as measured, None where it has none
+    """
+
+    effects: tuple[str, ...]
+    side: str | None
+    places: tuple[str, ...]
+    share: float
+    share_ci90: tuple[float, float]
+    law: str
+    probability: float
+    curve: Curve | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Contract form."""
+        return {
+            "effects": list(self.effects),
+            "family": self.effects[0],
+            "side": self.side,
+            "places": list(self.places),
+            "share": self.share,
+            "share_ci90": list(self.share_ci90),
+            "law": self.law,
+            "probability": self.probability,
+            "curve": curve_json(self.curve),
+        }
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What no family of the structure closes: its share of the squared nominal gap, where, and its course there."""
+
+    share: float
+    places: tuple[str, ...] = ()
+    curve: Curve | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """Contract form."""
+        return {"share": self.share, "places": list(self.places), "curve": curve_json(self.curve)}
+
+
+def curve_json(curve: Curve | None) -> dict[str, Any] | None:
+    """Contract form of a measured curve."""
+    if curve is None:
+        return None
+    axes = {key: {"name": axis.name, "unit": axis.unit} for key, axis in (("x", curve.x), ("y", curve.y))}
+    return {**axes, "points": np.asarray(curve.points, dtype=float).tolist()}
+
+
+@dataclass(frozen=True)
 class Experiment:
     """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
     apart.
@@ -193,6 +252,9 @@ class Diagnosis:
     gap : held-out gaps
     nuisance : estimated parameters of the chosen structure, by name: value, std, unit
     active : the chosen effects with their values
+    budget : effects of the best structure with their shares of the gap, largest first
+    refit_share, remainder, floor_share : what the tolerances close, what nothing closes, what sensors and form leave;
+        with the budget they add up to one
     not_testable : effects that this excitation could not have shown, with the smallest size it could
     notes : sentences for the reader: limitations, bounds reached, divergences
     tried : label and gap on the fitted logs of every candidate that was fitted, best first
@@ -208,6 +270,10 @@ class Diagnosis:
     gap: Gap
     nuisance: Mapping[str, Estimate]
     active: tuple[Active, ...]
+    budget: tuple[BudgetEntry, ...] = ()
+    refit_share: float = 0.0
+    remainder: Remainder | None = None
+    floor_share: float = 0.0
     not_testable: Mapping[str, str] = field(default_factory=dict)
     experiment: Experiment | None = None
     edit: EditTest | None = None
@@ -226,6 +292,10 @@ class Diagnosis:
             "ranking": [entry.to_json() for entry in self.ranking],
             "ambiguity_group": list(self.ambiguity_group),
             "gap": self.gap.to_json(),
+            "budget": [entry.to_json() for entry in self.budget],
+            "refit_share": self.refit_share,
+            "remainder": None if self.remainder is None else self.remainder.to_json(),
+            "floor_share": self.floor_share,
             "nuisance": {name: estimate.to_json() for name, estimate in self.nuisance.items()},
             "active": [{"effect": a.effect, "site": a.site, "values": list(a.values)} for a in self.active],
             "not_testable": dict(self.not_testable),

@@ -83,6 +83,7 @@ class Effect:
     derived : what they give together
     plant, inputs, outputs, term : hooks, see the module
     guide : what people want to know of it
+    slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     """
 
     id: str
@@ -97,6 +98,13 @@ class Effect:
     undo: Callable[[Array, tuple[int, ...], Values], Array] | None = None
     term: PlantTerm | None = None
     guide: Guide | None = field(default=None, compare=False)
+    slot: str = ""
+    columns: tuple[int, ...] = ()
+
+    @property
+    def place_in_kernel(self) -> str:
+        """Name of the kernel's slot that its term runs in: shapes of one place share one, their amplitudes add up."""
+        return self.slot or self.id
 
     def __post_init__(self) -> None:
         check_places(self.sites, self.places)

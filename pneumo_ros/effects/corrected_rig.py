@@ -141,8 +141,9 @@ class CorrectedRig:
         for one in self.model.terms(self.active):
             term = self.model.library[one.effect].term
             if term is not None and term.supply is not None and state.started:
-                k = [slot.name for slot in self.model.slots].index(one.effect)
-                drop += term.supply(tuple(state.inner[k, 0, : term.states]), one.values)
+                k = [slot.name for slot in self.model.slots].index(self.model.library[one.effect].place_in_kernel)
+                values = self.model.switches([one])[1][k, 0]
+                drop += term.supply(tuple(state.inner[k, 0, : term.states]), tuple(values))
         return self.plant.front.supply_pressure - drop
 
     def with_supply(self, pressure: float) -> CorrectedRig:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from pneumo_ros.effects import library
 from pneumo_ros.effects.cache import kept
 from pneumo_ros.effects.mistakes import in_effect_file
+from pneumo_ros.effects.parameters import is_law
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
@@ -71,8 +72,11 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     InputError
         if a file cannot be loaded, defines no effect, or ``without`` names an unknown id.
     """
+    from pneumo_ros.effects.shapes.families import SHAPES
+
     names = sorted(m.name for m in pkgutil.iter_modules(library.__path__))
     found = [importlib.import_module(f"{library.__name__}.{name}").EFFECT for name in names]
+    found += SHAPES.values()
     found += [_installed(point) for point in entry_points(group=ENTRY_POINT_GROUP)]
     found += [effect_in(Path(path)) for path in paths]
     effects = {effect.id: effect for effect in found}
@@ -81,6 +85,11 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(effects))
         del effects[name]
     return effects
+
+
+def laws_of(effects: Mapping[str, Effect]) -> dict[str, Effect]:
+    """What a verdict may name: the library without the shapes of families and of places."""
+    return {name: effect for name, effect in effects.items() if is_law(name)}
 
 
 def function_at(module: str, file: str, name: str) -> Any:

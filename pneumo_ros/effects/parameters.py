@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+
+from pneumo_ros.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,7 @@ class EffectParameter:
     typical : a size (or shape) worth trying first; also the scale of the fit
     size : True for the parameter whose zero means "no effect"; False for one that shapes it
     starts : further values to start the fit from
+    spread : prior standard deviation, in typical values; infinite where nothing is known beforehand
     ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
         well stop; a stop at another bound is counted against the effect
     """
@@ -43,6 +47,7 @@ class EffectParameter:
     size: bool = False
     starts: tuple[float, ...] = ()
     ends: tuple[float, ...] = (0.0,)
+    spread: float = math.inf
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
@@ -51,6 +56,20 @@ class EffectParameter:
             if not self.low <= value <= self.high:
                 text = f"parameter {self.name!r}: {word} {value:g} is outside low {self.low:g} to high {self.high:g}"
                 raise ValueError(text)
+
+
+# A family's shape is called <family>.shape; what may act at a place, whatever it is, anything.<kind of place>.
+SHAPE, ANYTHING = "shape", "anything"
+
+
+def family_of(effect: str) -> str:
+    """The mechanism that an effect of the library is a law or the shape of: its id up to the first dot."""
+    return effect.partition(".")[0]
+
+
+def is_law(effect: str) -> bool:
+    """Whether an effect competes by itself: a law of a family, neither its shape nor a place's ceiling."""
+    return not effect.endswith(f".{SHAPE}") and family_of(effect) != ANYTHING
 
 
 @dataclass(frozen=True)
@@ -72,3 +91,26 @@ class Active:
     effect: str
     site: str
     values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Name and unit of a coordinate."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law as measured.
+
+    Attributes
+    ----------
+    x, y : coordinates
+    points : (B, 5) x, y, low and high end of the 90 % band, weight (share of the run in the bin)
+    """
+
+    x: Axis
+    y: Axis
+    points: Array

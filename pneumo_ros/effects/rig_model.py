@@ -27,7 +27,8 @@ from pneumo_ros.effects.contract import (
     ends_of,
 )
 from pneumo_ros.effects.loading import load_library
-from pneumo_ros.effects.parameters import Active, Parameter
+from pneumo_ros.effects.parameters import Active, Curve, Parameter
+from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, AreaSurface, Gas, load_surface
 from pneumo_ros.plant.half_car import Body, HalfCar, half_car, simulate, substeps
 from pneumo_ros.plant.trim import trim
@@ -163,6 +164,18 @@ class RigModel:
             return tuple(SENSOR_PLACES[CHANNELS[channel]] for channel in channels_of(active.site))
         ends = [end for end, on in zip(("front", "rear"), ends_of(active.site), strict=True) if on]
         return tuple(dict.fromkeys(place.format(end=end) for place in effect.places for end in ends))
+
+    def anything_at(self, place: str) -> tuple[tuple[str, str], ...]:
+        """(effect, site) of what may act at a place; nothing where no term reaches."""
+        return tuple(part for part in anything_at(place) if part[0] in self.effects)
+
+    def curve(
+        self, record: Drive, nuisance: Array, active: Sequence[Active], own: Sequence[Active], covariance: Array
+    ) -> Curve | None:
+        """Curve of one effect's parts along a record, see :mod:`pneumo_ros.effects.curves`."""
+        from pneumo_ros.effects.curves import curve_of
+
+        return curve_of(self, record, nuisance, active, own, covariance)
 
     def side(self, active: Active) -> str | None:
         """The end for an effect of an end; None for the whole rig and for sensors (their place names the channel)."""
@@ -305,9 +318,13 @@ class RigModel:
     @cached_property
     def slots(self) -> tuple[Slot, ...]:
         """Terms of the library in the kernel's order."""
-        return tuple(
-            Slot(e.id, e.term, len(e.parameters)) for _, e in sorted(self.library.items()) if e.term is not None
-        )
+        found: dict[str, Slot] = {}
+        for _, e in sorted(self.library.items()):
+            if e.term is not None:
+                name, count = e.place_in_kernel, max([len(e.parameters), *(column + 1 for column in e.columns)])
+                known = found.get(name)
+                found[name] = Slot(name, e.term, max(count, known.parameters if known else 0))
+        return tuple(found[name] for name in sorted(found))
 
     @cached_property
     def kernel(self) -> Compiled:
@@ -332,9 +349,15 @@ class RigModel:
         on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
         values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in self.slots)])))
         for one in terms:
+            effect = self.library[one.effect]
+            k = slots[effect.place_in_kernel]
             for end in ends_of(one.site).columns:
-                on[slots[one.effect], end] = True
-                values[slots[one.effect], end, : len(one.values)] = one.values
+                if not effect.columns:
+                    values[k, end, : len(one.values)] = one.values
+                else:
+                    values[k, end] = values[k, end] if on[k, end] else 0.0
+                    values[k, end, list(effect.columns)] += one.values
+                on[k, end] = True
         return on, values
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.effects.parameters import Active, EffectParameter
+from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
 AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
 MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
@@ -34,6 +34,16 @@ class Candidate:
     """A set of effects at sites; empty: the nominal structure re-estimated."""
 
     parts: tuple[Part, ...] = ()
+
+    @property
+    def laws(self) -> tuple[Part, ...]:
+        """The effects that are claimed, without the shapes that take up what their laws leave."""
+        return tuple(part for part in self.parts if is_law(part[0]))
+
+    @property
+    def shapes(self) -> tuple[Part, ...]:
+        """Shapes of families, and what may act anywhere."""
+        return tuple(part for part in self.parts if not is_law(part[0]))
 
     @property
     def label(self) -> str:
@@ -78,10 +88,7 @@ class Problem:
     def weight(self) -> Array:
         """(n, C) 1/sigma, zero where no sample is there: noise after averaging and the model-form floor together."""
         form = np.vstack(
-            [
-                np.tile(MODEL_FORM_FLOOR * scale_of(r), (len(n), 1))
-                for r, n in zip(self.records, self._real, strict=True)
-            ]
+            [np.tile(form_of(r) * scale_of(r), (len(n), 1)) for r, n in zip(self.records, self._real, strict=True)]
         )
         sigma = np.hypot(self.noise, form)
         there = np.vstack([real.any(axis=1) for real in self._real])
@@ -156,6 +163,11 @@ class Problem:
         high = np.array([p.high / p.typical for p in parameters])
         return np.concatenate([-reach, -free, low]), np.concatenate([reach, free, high])
 
+    def prior(self, candidate: Candidate) -> Array:
+        """Inverse variance of each scaled unknown: nuisance and initial state one, effects that of their spread."""
+        own = [1.0 / p.spread**2 for p in self.effect_parameters(candidate)]
+        return np.concatenate([np.ones(self.fixed), own])
+
     def start(self, candidate: Candidate, fixed: Array | None, values: Sequence[float]) -> Array:
         """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""
         scaled = [v / p.typical for v, p in zip(values, self.effect_parameters(candidate), strict=True)]
@@ -213,6 +225,11 @@ class Problem:
     def residual(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) measured - predicted, in sigmas."""
         return (self.measured - self.predict(candidate, x)) * self.weight
+
+
+def form_of(record: Any) -> float:
+    """Share of a channel's std that the maker's model form is worth, with the floor of any model of this kind."""
+    return float(np.hypot(MODEL_FORM_FLOOR, getattr(record, "model_form", 0.0)))
 
 
 def _between(rows: Array, count: int) -> Array:

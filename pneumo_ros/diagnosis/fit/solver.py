@@ -55,7 +55,7 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
+def cost_of(residual: Array, rows: Mask | slice, x: Array, prior: Array) -> float:
     """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
     r = residual[rows]
     if not np.all(np.isfinite(r)):
@@ -63,7 +63,7 @@ def cost_of(residual: Array, rows: Mask | slice, x: Array, fixed: int) -> float:
     limit = HUBER * robust_scale(r)
     magnitude = np.abs(r)
     rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
-    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + x[:fixed] @ x[:fixed])
+    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
 
 
 def robust_scale(residual: Array) -> float:
@@ -79,22 +79,26 @@ def fit(
     rows: Mask | None = None,
     iterations: int = 10,
     probe: bool = False,
+    shared: int | None = None,
 ) -> Fit:
     """Best unknowns from one start.
 
     Parameters
     ----------
     start : scaled unknowns
-    jacobian : (n, C, >= fixed) sensitivities whose fixed columns serve the first step
+    jacobian : (n, C, >= shared) sensitivities whose first columns serve the first step
     rows : fitted samples; the problem's by default
-    probe : borrow the fixed columns for every step: a tenth of the cost, for a first look at a candidate
+    probe : borrow those columns for every step: a tenth of the cost, for a first look at a candidate
+    shared : how many of them are of the same unknowns; by default the fixed ones, more where the candidate is the
+        jacobian's own with further parts
     """
     rows = problem.fitted if rows is None else rows
     bounds = problem.bounds(candidate)
     state = _evaluate(problem, candidate, np.clip(start, *bounds), rows)
     if state.diverged:
         return state
-    borrowed = None if jacobian is None else jacobian[:, :, : problem.fixed]
+    shared = problem.fixed if shared is None else shared
+    borrowed = None if jacobian is None else jacobian[:, :, :shared]
     damping, failed = START_DAMPING, False
     for _ in range(iterations):
         columns = _jacobian(problem, state, borrowed)
@@ -107,14 +111,14 @@ def fit(
                 break
             failed = True
         if not probe:
-            borrowed = columns[:, :, : problem.fixed] if moved < NEAR and gained >= TOLERANCE else None
+            borrowed = columns[:, :, :shared] if moved < NEAR and gained >= TOLERANCE else None
         damping = damping if gained >= TOLERANCE else START_DAMPING
     return state
 
 
 def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
     residual = problem.residual(candidate, x)
-    return Fit(candidate, x, cost_of(residual, rows, x, problem.fixed), residual, None, spent + 1)
+    return Fit(candidate, x, cost_of(residual, rows, x, problem.prior(candidate)), residual, None, spent + 1)
 
 
 def _spent(columns: Array, borrowed: Array | None) -> int:
@@ -178,8 +182,7 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     strength = 1.0 / (CORRELATION * (COST_FLOOR + rho.mean()))
     root = np.sqrt(w)
     A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
-    prior = np.zeros(len(state.x))
-    prior[: problem.fixed] = 1.0
+    prior = problem.prior(state.candidate)
     H = strength * (A.T @ A) + np.diag(prior + 1e-9)
     return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
 

@@ -19,7 +19,7 @@ from pneumo_ros.effects import library as own_effects
 from pneumo_ros.effects.configured import library_of, with_files
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.loading import origins
-from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.parameters import Active, is_law
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import Rig
@@ -96,7 +96,7 @@ def prepared(
 def _outside(library: Mapping[str, Effect]) -> list[str]:
     """Which effects of the library are not the package's own: a reader must know who competed."""
     folder = Path(str(own_effects.__file__)).parent
-    names = [name for name in library if not (folder / f"{name}.py").exists()]
+    names = [name for name in library if is_law(name) and not (folder / f"{name}.py").exists()]
     return [f"effects of your own that competed: {', '.join(names)}"] if names else []
 
 
@@ -174,4 +174,4 @@ class FlexibleSearch:
             return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
         gain = flexible_gain(model, fit, holdout, nuisance, active, self.first)
         flat = not gain.places
-        return Whereabouts((), float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)
+        return Whereabouts(gain.shares, float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)

@@ -24,7 +24,7 @@ def ambiguity_group(problem: Problem, opinion: Opinion, finalists: Sequence[Scor
     beside "none" one that is barely too small to be accepted, beside "unknown" one that may be it under another law.
     """
     names = [] if opinion.verdict in ("none", "unknown") else [opinion.verdict, *_alike(problem, opinion, finalists)]
-    possible = {name: p for name, p in opinion.effects.items() if p >= POSSIBLE and name not in names}
+    possible = {name: p for name, p in opinion.names.items() if p >= POSSIBLE and name not in names}
     return (*names, *sorted(possible, key=lambda name: -possible[name]))
 
 

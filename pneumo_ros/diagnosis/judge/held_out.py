@@ -89,6 +89,11 @@ def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, s
     return float(low), float(high)
 
 
+def total_floor(record: Any) -> float:
+    """Gap that sensors' noise and the model's stated form leave together."""
+    return float(np.hypot(total_gap(noise_floor(record)), getattr(record, "model_form", 0.0)))
+
+
 def noise_floor(record: Any) -> Array:
     """(C,) gap that the sensors' white noise alone leaves; NaN for a channel without a sample."""
     return np.where((record.weight > 0.0).any(axis=0), record.noise / scale_of(record), np.nan)

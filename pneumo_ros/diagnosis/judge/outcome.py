@@ -9,6 +9,8 @@ from typing import Any
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.judge.budget import Budget
+from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
 from pneumo_ros.diagnosis.search.competition import Contest
 from pneumo_ros.diagnosis.search.selection import Scored
@@ -21,7 +23,7 @@ class Whereabouts:
 
     Attributes
     ----------
-    shares : (place, share of the held-out residual), largest first
+    shares : (place, share of the held-out residual that the structure leaves), largest first
     left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
     mendable : the same once the right places get a flexible correction
     flat : noise, tolerances and model form explain what is left
@@ -46,6 +48,8 @@ class Outcome:
     base, best : the refit and the chosen structure, fitted to all blocks; the same object where nothing was chosen
     holdout : the held-out record
     runs : "nominal", "refit" and "best" on it
+    closable : what could be closed at the places of the best structure's effects, and elsewhere
+    budget : shares of the nominal gap
     before, after : places of what the nominal and the best structure leave; None where nobody looked
     """
 
@@ -57,6 +61,8 @@ class Outcome:
     best: Fit
     holdout: Any
     runs: Mapping[str, HeldOut]
+    closable: Closable
+    budget: Budget
     before: Whereabouts | None
     after: Whereabouts | None
 

@@ -18,7 +18,7 @@ from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Ranked
 from pneumo_ros.diagnosis.search.competition import with_jacobian
 from pneumo_ros.diagnosis.search.selection import Scored
-from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.parameters import Active, family_of
 
 
 def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
@@ -48,15 +48,15 @@ def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: flo
 
 
 def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Any) -> Ranked:
-    parts = one.candidate.parts
+    laws = one.candidate.laws
     estimates = effect_estimates(problem, one, covariance(problem, one))
     notes = [f"{name} ended at its bound" for name, e in estimates.items() if e.at_bound]
     notes += [f"{name} moves no output" for name, e in estimates.items() if e.moves_nothing]
     if not np.all(np.isfinite(run.predicted)):
         notes.append("unstable on the held-out log")
     return Ranked(
-        effects=tuple(effect for effect, _ in parts),
-        sites=tuple(site for _, site in parts),
+        effects=tuple(family_of(effect) for effect, _ in laws),
+        sites=tuple(site for _, site in laws),
         side=side_of(problem.model, one.candidate),
         probability=probability,
         parameters=estimates,

@@ -1,21 +1,24 @@
-"""From scores to a verdict with a probability.
+"""From scores to a verdict with a probability for each effect.
 
-Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind, on the blocks
-kept from the fit and on the held-out log alike? If not, the effect is not in the library ("unknown"): a wrong effect
-often mimics the fitted log and seldom another excitation. And among the named: how much better does one fit than the
-next? The held-out log never chooses between names.
+Two questions in turn. How much better does a structure fit than the next, on the logs that were fitted and on their
+kept blocks? And of each effect of the best one: does its family close most of what can be closed at its place on the
+held-out log, or does something else act there? No share of the misfit decides: a right law may leave more of it than a
+wrong one, but whatever may act at the place then closes no more (:mod:`pneumo_ros.diagnosis.judge.closable`). The
+held-out log never chooses between names.
 The constants are calibrated on simulated cases with known answers (bench/calibrate_verdict.py makes them again).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Candidate
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part
+from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.effects.parameters import family_of
 
 
 @dataclass(frozen=True)
@@ -27,14 +30,12 @@ class Calibration:
     sharpness : fall of log probability per unit of log mean square of the fitted data: as many samples' worth of
         evidence, however long the log, because laws differ by more than chance does
     first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
-    leftover : share of the refit's misfit (rms) on the selection blocks left by the best named structure at which
-        "unknown" is as likely as it
-    leftover_held : the same of the held-out free run, where the command's jumps are known to a row only
+    closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
+        "something else acts there"
+    ceiling : how many times what the ceiling leaves the whole structure may leave at that
     steepness : exponent of these transitions
-    floor : mean square, sigmas, that a right structure may leave by its sensors and numerics alone
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
-    held : held-out gap over the noise floor that a right structure may leave (jitter, lost samples, jumps between rows)
-    kept : share of the held-out equations' gap left by the best named structure at which "unknown" is as likely as it
+    least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     walls : parameters at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
@@ -42,14 +43,12 @@ class Calibration:
     sharpness: float = 36.0
     first_toll: float = 9.0
     second_toll: float = 9.0
-    leftover: float = 0.065
-    leftover_held: float = 0.18
+    closes: float = 0.5
+    ceiling: float = 2.0
     steepness: float = 4.0
-    floor: float = 0.6
     real: float = 2.5
-    held: float = 1.5
-    kept: float = 0.25
     walls: float = 1.3
+    least: float = 0.015
     held_real: float = 3.0
 
 
@@ -59,14 +58,14 @@ class HeldOutGaps:
 
     Attributes
     ----------
-    refit, chosen : free-run gaps of the refit and of the chosen structure, in noise floors
-    kept : share of the equations' gap that the chosen structure leaves to flexible corrections; None where the
-        equations show too little of it
+    refit, chosen : free-run gaps of the refit and of the chosen structure over the floor that sensors and the stated
+        model form leave
+    form : what the maker holds the model form to be worth, over the same floor; 0 where nothing is stated
     """
 
     refit: float
     chosen: float
-    kept: float | None = None
+    form: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -76,26 +75,31 @@ class Opinion:
     Attributes
     ----------
     chosen : the selected structure (the refit for "none" and "unknown")
-    verdict : id, pair of ids, "none" or "unknown"
+    verdict : ids joined by "+", "none" or "unknown"
     named : probability of each finalist and of the refit ("none"), by candidate
-    unknown : probability that the library lacks the effect
+    unknown : probability that no effect of the chosen structure is what acts at its place
+    effects : probability of each effect of the chosen structure, whatever else is, by law and site
     """
 
     chosen: Scored
     verdict: str
     named: Mapping[Candidate, float]
     unknown: float
+    effects: Mapping[Part, float] = field(default_factory=dict)
 
     @property
     def probability(self) -> float:
-        """Of the verdict: all candidates of the same effects count together, whatever their sites."""
-        return self.unknown if self.verdict == "unknown" else self.of(self.verdict)
+        """Of the verdict: of the least certain effect that it names."""
+        if self.verdict == "unknown":
+            return self.unknown
+        own = [p for part, p in self.effects.items() if family_of(part[0]) in self.verdict.split("+")]
+        return min(own) if own else self.of(self.verdict)
 
     @property
-    def effects(self) -> dict[str, float]:
-        """Probability of each effect, or pair of effects, wherever it sits."""
-        names = dict.fromkeys(name_of(c) for c in self.named if c.parts)
-        return {name: self.of(name) for name in names}
+    def names(self) -> dict[str, float]:
+        """Probability of each structure's name, wherever its effects sit."""
+        found = dict.fromkeys(name_of(c) for c in self.named if c.parts)
+        return {name: self.of(name) for name in found}
 
     def of(self, name: str) -> float:
         """Probability of all candidates of a name."""
@@ -104,7 +108,7 @@ class Opinion:
 
 def name_of(candidate: Candidate) -> str:
     """Verdict word of a candidate; one effect at two places is still that effect."""
-    return "+".join(dict.fromkeys(sorted(effect for effect, _ in candidate.parts))) or "none"
+    return "+".join(sorted({family_of(effect) for effect, _ in candidate.laws})) or "none"
 
 
 def judge(
@@ -113,27 +117,52 @@ def judge(
     chosen: Scored,
     calibration: Calibration,
     held: HeldOutGaps,
-    walls: int = 0,
+    evidence: Sequence[EffectEvidence] = (),
+    at_bounds: int = 0,
 ) -> Opinion:
-    """Probabilities of the refit, of every finalist and of "unknown"; the verdict follows the selection.
+    """Probabilities of the refit, of every finalist, of each effect of the chosen one, and of "unknown".
 
-    ``walls`` counts the chosen structure's parameters at a bound.
+    ``at_bounds`` counts the chosen structure's parameters at a bound that is no natural end of its law.
     """
-    named = _named(refit, finalists, chosen, calibration)
-    unknown = nameless(refit.level, chosen.level if chosen.size else None, held, walls, calibration)
-    scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
-    verdict = "unknown" if unknown > 0.5 else name_of(chosen.fit.candidate)
-    return Opinion(chosen, verdict, scaled, unknown)
+    named = structures(refit, finalists, chosen, calibration)
+    if not chosen.size:
+        unknown = unexplained(refit.level, held, calibration)
+        scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
+        return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
+    worse = held.chosen >= held.refit or (held.form > 0.0 and held.refit <= 1.0)
+    trust = {one.law: 0.0 if worse else credit(one, held, at_bounds, calibration) for one in evidence}
+    trusted = max(trust.values(), default=0.0)
+    unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)
+    scaled = {candidate: p * trusted for candidate, p in named.items()}
+    scaled[refit.fit.candidate] += 1.0 - trusted - unknown
+    effects = {law: value * _in_structure(named, law) for law, value in trust.items()}
+    names = sorted({family_of(law[0]) for law, value in trust.items() if value > 0.5})
+    nameless = "unknown" if unknown >= scaled[refit.fit.candidate] else "none"
+    return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 
 
-def _named(
+def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: Calibration) -> float:
+    """Probability that an effect of the structure is what acts at its place, 0..1."""
+    c = calibration
+    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls, c.least / max(one.share, 1e-9)]
+    share = max(against) ** c.steepness
+    return float(1.0 / (1.0 + share))
+
+
+def _in_structure(named: Mapping[Candidate, float], law: Part) -> float:
+    """Probability that a structure holds a law's family, the refit and all finalists together."""
+    return min(1.0, sum(p for c, p in named.items() if any(family_of(e) == family_of(law[0]) for e, _ in c.laws)))
+
+
+def structures(
     refit: Scored, finalists: Sequence[Scored], chosen: Scored, calibration: Calibration
 ) -> dict[Candidate, float]:
-    """Softmax of the training costs, parameters and effects paying their tolls; the selection has the last word."""
-    tolls = (0.0, calibration.first_toll, calibration.first_toll + calibration.second_toll)
+    """Softmax of the training costs, parameters and effects paying their price; the selection has the last word."""
+    c = calibration
 
     def height(s: Scored) -> float:
-        return -calibration.sharpness * s.price / s.samples - tolls[min(s.size, 2)]
+        tolls = c.first_toll * min(s.size, 1) + c.second_toll * max(s.size - 1, 0)
+        return -c.sharpness * s.price / s.samples - tolls
 
     heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
     top = max(heights.values())
@@ -144,28 +173,14 @@ def _named(
     return {c: w / total for c, w in weights.items()}
 
 
-def nameless(
-    level_refit: float, level_chosen: float | None, held: HeldOutGaps, walls: int, calibration: Calibration
-) -> float:
-    """Probability that what is left is the work of something without a name.
+def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration) -> float:
+    """Probability that what the refit leaves is the work of something without a name, where no effect was chosen.
 
-    Parameters
-    ----------
-    level_refit, level_chosen : mean squares on the selection blocks, sigmas; None where no effect was chosen
-    held, walls, calibration : as in :func:`judge`
+    ``level_refit`` : mean square on the selection blocks, sigmas
     """
     c = calibration
-    if level_chosen is None:
-        share = (level_refit / c.real) ** (0.5 * c.steepness)
-        share += (beyond(held.refit, 1.0) / beyond(c.held_real, 1.0)) ** c.steepness
-        return float(share / (1.0 + share))
-    left = np.sqrt(max(0.0, level_chosen - c.floor) / max(level_refit, 1e-9))
-    left_held = beyond(held.chosen, c.held) / max(beyond(held.refit, 1.0), c.held)
-    # A law that is bent to the ends of what it can do stands in for another one.
-    against = [left / c.leftover, left_held / c.leftover_held, walls / c.walls]
-    if held.kept is not None:
-        against.append(held.kept / c.kept)
-    share = max(against) ** c.steepness
+    share = (level_refit / c.real) ** (0.5 * c.steepness)
+    share += (beyond(held.refit, 1.0) / beyond(c.held_real, 1.0)) ** c.steepness
     return float(share / (1.0 + share))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.diagnosis.report.rig_map import draw_map
 from pneumo_ros.diagnosis.report.words import (
@@ -76,6 +77,8 @@ def contents(found: Findings) -> dict[str, Any]:
         "tone": _tone(summary),
         "how_far": how_far(summary),
         "next_steps": next_steps(summary, found.fit_names),
+        "waterfall": waterfall(budget_rows(summary)) if told and summary.get("budget") else "",
+        "measured": _measured(summary) if told else [],
         "map": draw_map(shares),
         "places": [
             {"name": place, "words": place_words(place), "share": share}
@@ -103,6 +106,18 @@ def contents(found: Findings) -> dict[str, Any]:
         "rig": found.holdout.rig.name,
         "seconds": len(found.holdout.measured) * found.holdout.period,
     }
+
+
+def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
+    """Each law as measured, the remainder's too."""
+    out = []
+    for row in budget_rows(summary):
+        held = row["entry"] if row["kind"] == "effect" else summary["remainder"] if row["kind"] == "rest" else {}
+        if held.get("curve"):
+            law = str(held.get("law", ""))
+            known = "as no law of the library" if law in ("", "differs") else "as the library's law"
+            out.append({"plot": curve_plot(held["curve"]), "text": f"{sentence(row['words'])}, {known}."})
+    return out
 
 
 def _tone(summary: Mapping[str, Any]) -> str:

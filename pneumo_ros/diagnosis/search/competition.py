@@ -69,6 +69,7 @@ class Contest:
     problem : the same as last timed
     refit : the nominal structure re-estimated
     singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
+    structures : leading ones with the shapes of their families, and those that grew from them
     promised : screening of the singles at the refit, for the report
     lost : labels of candidates whose fit diverged
     visible : effect id -> rms in sigmas that its typical size would move the outputs by
@@ -81,13 +82,20 @@ class Contest:
     progress: Progress
     singles: list[Fit] = field(default_factory=list)
     pairs: list[Fit] = field(default_factory=list)
+    structures: list[Fit] = field(default_factory=list)
     promised: list[Promise] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
     visible: dict[str, float] = field(default_factory=dict)
 
     @property
     def finalists(self) -> list[Fit]:
-        """Converged singles and pairs."""
+        """Every converged structure; of those with the same laws the last one made."""
+        latest = {one.candidate.laws: one for one in (*self.laws, *self.structures)}
+        return list(latest.values())
+
+    @property
+    def laws(self) -> list[Fit]:
+        """Converged singles and pairs by their laws alone."""
         return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
 
     @property
@@ -110,7 +118,7 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     _time_jumps(contest)
     _run_singles(contest)
     _time_jumps(contest)
-    if pairs and contest.singles and _room_for_more(contest):
+    if pairs and contest.singles and room_for_more(contest):
         _run_pairs(contest)
         _time_jumps(contest)
     return contest
@@ -142,7 +150,7 @@ def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
     return state if other is None or not other.cost < state.cost else other
 
 
-def _room_for_more(contest: Contest) -> bool:
+def room_for_more(contest: Contest) -> bool:
     """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
     blocks is so near the sensors' noise that even all of the rest would not be enough.
     """
@@ -157,7 +165,7 @@ def _time_jumps(contest: Contest) -> None:
     if moved is contest.problem:
         return
     contest.problem = moved
-    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.finalists]
+    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.laws]
     contest.refit = fit(moved, Candidate(), contest.refit.x, contest.refit.jacobian)
     singles, pairs = contest.effort.finalists, contest.effort.pair_finalists
     done = len(contest.singles[:singles])
@@ -171,8 +179,8 @@ def _run_singles(contest: Contest) -> None:
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
     contest.visible = visibility(problem, contest.refit, found)
-    chosen = _varied(_probed(problem, contest.refit, contest.promised), effort.singles, 3)
-    short = _short_fits(contest, contest.refit, chosen, (0.1, 0.4))
+    chosen = varied(probed(problem, contest.refit, contest.promised), effort.singles, 3)
+    short = short_fits(contest, contest.refit, chosen, (0.1, 0.4))
     ended = [
         _finish(problem, one, effort, contest.refit if k < STARTED_TWICE else None)
         for k, one in enumerate(short[: effort.finalists])
@@ -186,7 +194,7 @@ def _run_pairs(contest: Contest) -> None:
     seen: set[frozenset[Part]] = set()
 
     def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
-        fresh = _varied([p for p in promised if frozenset((*base, *p.parts)) not in seen], count, 2)
+        fresh = varied([p for p in promised if frozenset((*base, *p.parts)) not in seen], count, 2)
         seen.update(frozenset((*base, *p.parts)) for p in fresh)
         return fresh
 
@@ -196,12 +204,12 @@ def _run_pairs(contest: Contest) -> None:
         part = leader.candidate.parts[0]
         others = [p for p in all_parts(problem) if compatible((part, p))]
         promised = promises(problem, leader, trials(problem, leader, others))
-        promised = _probed(problem, leader, _varied(promised, effort.probes, 3))
+        promised = probed(problem, leader, varied(promised, effort.probes, 3))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
-        short += _short_fits(contest, leader, unseen(promised, (part,), count), span)
+        short += short_fits(contest, leader, unseen(promised, (part,), count), span)
     found = trials(problem, contest.refit, all_parts(problem))
     blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
-    short = _by_cost(short + _short_fits(contest, contest.refit, blind, (0.8, 0.85)))
+    short = _by_cost(short + short_fits(contest, contest.refit, blind, (0.8, 0.85)))
     ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
     contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
     _exchange_each(contest)
@@ -225,7 +233,7 @@ def _exchange_each(contest: Contest) -> None:
         tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
         promised = promises(problem, alone, trials(problem, alone, rivals))
         fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
-        for short in _short_fits(contest, alone, _probed(problem, alone, fresh)[:1], (0.86, 0.88)):
+        for short in short_fits(contest, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
             contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
 
 
@@ -268,7 +276,7 @@ def _try_without_each(contest: Contest) -> None:
             contest.singles = _by_cost([alone, *rest[: contest.effort.finalists]]) + rest[contest.effort.finalists :]
 
 
-def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
+def varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
     """The most promising, but not more than a few sites of one effect, so that rivals of another kind get their
     chance.
     """
@@ -282,7 +290,7 @@ def _varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise
     return taken
 
 
-def _probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Promise]:
+def probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Promise]:
     """The promises in the order of what a few cheap steps make of them, with the values those end at: the screening is
     linear, and a typical size may be far from the true one.
     """
@@ -291,20 +299,20 @@ def _probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Pr
     for promise in promised:
         candidate = Candidate((*base.candidate.parts, *promise.parts))
         start = problem.start(candidate, base.x[: problem.fixed], [*own, *promise.values])
-        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True)
+        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
         values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
         ranked.append((one.cost, promise if one.diverged else replace(promise, values=values)))
     return [promise for _, promise in sorted(ranked, key=lambda item: item[0])]
 
 
-def _short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
+def short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
     problem, out = contest.problem, []
     for k, promise in enumerate(chosen):
         candidate = Candidate((*base.candidate.parts, *promise.parts))
         contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
         values = [*problem.values(base.candidate, base.x), *promise.values]
         start = problem.start(candidate, base.x[: problem.fixed], values)
-        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short)
+        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short, shared=len(base.x))
         one = _rescued(problem, one, contest.effort.short)
         if one.diverged:
             contest.lost.append(candidate.label)

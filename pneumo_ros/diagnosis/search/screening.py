@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
 SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
 
@@ -65,8 +65,8 @@ def start_values(parameters: Sequence[EffectParameter]) -> list[tuple[float, ...
 
 
 def all_parts(problem: Problem) -> list[Part]:
-    """Every effect of the library at every site."""
-    return [(e.id, site) for e in problem.model.effects.values() for site in e.sites]
+    """Every law of the library at every site."""
+    return [(e.id, site) for e in problem.model.effects.values() if is_law(e.id) for site in e.sites]
 
 
 def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
@@ -107,7 +107,7 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     """
     gram, _, _ = _projected(problem, base, found, held=False)
     count = float(np.count_nonzero(problem.weight[problem.fitted]))
-    out = dict.fromkeys(problem.model.effects, 0.0)
+    out = dict.fromkeys(filter(is_law, problem.model.effects), 0.0)
     for trial, square in zip(found, np.diag(gram), strict=True):
         out[trial.part[0]] = max(out[trial.part[0]], float(np.sqrt(max(square, 0.0) / count)))
     return out
@@ -133,7 +133,7 @@ def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, 
 def compatible(parts: tuple[Part, ...]) -> bool:
     """Two sites of one effect only where they do not overlap."""
     (first, site), (second, other) = parts
-    return first != second or (site != other and "both" not in (site, other))
+    return family_of(first) != family_of(second) or (site != other and "both" not in (site, other))
 
 
 def _signed(problem: Problem, trial: Trial) -> bool:

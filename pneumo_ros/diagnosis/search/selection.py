@@ -97,15 +97,21 @@ class Scored:
     @property
     def size(self) -> int:
         """Number of effects."""
-        return len(self.fit.candidate.parts)
+        return len(self.fit.candidate.laws)
 
     @property
     def price(self) -> float:
         """Training cost with the toll of its parameters. An effect at one end that was seen is preferred to the same at
         both, where the other end's was not: on another road it would act.
         """
-        wide = sum(site == "both" for _, site in self.fit.candidate.parts)
-        return self.fit.cost + TOLL * (len(self.fit.x) + wide)
+        laws = self.fit.candidate.laws
+        wide = sum(site == "both" for _, site in laws)
+        return self.fit.cost + TOLL * (self.unknowns + wide)
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of the fit; of the atoms of a shape only those that are used."""
+        return int(np.count_nonzero(self.fit.x != 0.0)) if self.fit.candidate.shapes else len(self.fit.x)
 
 
 def score(problem: Problem, fit: Fit) -> Scored:
@@ -144,11 +150,10 @@ def standard_error(one: Scored, other: Scored) -> float:
 def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Scored:
     """The chosen structure; the refit itself when nothing beats it by enough."""
     chosen = refit
-    wanted = (
-        (1, limits.first, max(limits.first_cost, limits.first_share * refit.samples)),
-        (2, limits.second, max(limits.second_cost, limits.second_share * refit.samples)),
-    )
-    for size, gain, cost in wanted:
+    first = (limits.first, max(limits.first_cost, limits.first_share * refit.samples))
+    further = (limits.second, max(limits.second_cost, limits.second_share * refit.samples))
+    for size in range(1, 1 + max((f.size for f in finalists), default=0)):
+        gain, cost = first if size == 1 else further
         rivals = [f for f in finalists if f.size == size]
         if not rivals:
             continue

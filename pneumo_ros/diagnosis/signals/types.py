@@ -126,6 +126,11 @@ class Signals:
         return self.start_state.std
 
     @property
+    def model_form(self) -> float:
+        """Share of each channel's std below which the rig's maker calls no difference an effect."""
+        return self.rig.model_form.value
+
+    @property
     def usable(self) -> NDArray[np.bool_]:
         """(6,) channels that carry anything."""
         return np.asarray(self.weight.any(axis=0))

@@ -33,6 +33,7 @@ class FlexibleGain:
     mended : with the flexible correction of the places that need it, fitted to other logs
     spread : standard error of ``log_ratio``, from blocks of the held-out log
     places : where the flexible correction acts; empty where nothing calls for one
+    shares : of what is left, by place, largest first
     """
 
     before: float
@@ -40,6 +41,7 @@ class FlexibleGain:
     mended: float
     spread: float
     places: tuple[str, ...]
+    shares: tuple[tuple[str, float], ...] = ()
 
     @property
     def log_ratio(self) -> float:
@@ -75,7 +77,7 @@ def flexible_gain(
     nominal = before or locate(model, fit, judge)
     found = locate(model, fit, judge, Start(nuisance, tuple(active)))
     left, mended = found.level["refit"] ** 2, found.level["chosen"] ** 2
-    return FlexibleGain(nominal.level["refit"] ** 2, left, mended, _spread(found), found.chosen)
+    return FlexibleGain(nominal.level["refit"] ** 2, left, mended, _spread(found), found.chosen, found.shares)
 
 
 def _spread(found: Location) -> float:

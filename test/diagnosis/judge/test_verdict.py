@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from pneumo_ros.diagnosis.fit.problem import Candidate
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
+from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge
 from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, select
 
-CALM = HeldOutGaps(1.1, 1.1)
+CALM = HeldOutGaps(1.2, 1.1)
 LIMITS = Thresholds()
 
 
@@ -23,9 +22,21 @@ def scored(level: float, cost: float, *effects: str, unknowns: int = 30, site: s
     return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0)
 
 
-def opinion(refit: Scored, *others: Scored, held: HeldOutGaps = CALM, walls: int = 0) -> Opinion:
+def evidence(chosen: Scored, without: float, own: float, ceiling: float) -> list[EffectEvidence]:
+    """For each effect: rms gap without it, with it, and with anything at its place."""
+    squares = (without**2, own**2, ceiling**2)
+    return [EffectEvidence(law, ("front_force",), *squares) for law in chosen.fit.candidate.laws]
+
+
+def opinion(
+    refit: Scored,
+    *others: Scored,
+    held: HeldOutGaps = CALM,
+    at_bounds: int = 0,
+    gaps: tuple[float, float, float] = (1.0, 0.1, 0.1),
+) -> Opinion:
     chosen = select(refit, others, LIMITS)
-    return judge(refit, others, chosen, Calibration(), held, walls)
+    return judge(refit, others, chosen, Calibration(), held, evidence(chosen, *gaps), at_bounds)
 
 
 def test_what_chance_wins_is_none() -> None:
@@ -44,20 +55,34 @@ def test_two_names_that_fit_alike_share_the_probability() -> None:
     assert {found.verdict} <= {"valve_lag", "transport_delay"} and 0.4 < found.probability < 0.65
 
 
+def test_a_family_that_closes_what_can_be_closed_is_named_however_much_is_left() -> None:
+    """A law of another rig leaves a tenth or a half of the misfit; so does everything else at its place."""
+    structures = scored(400.0, 3000.0), scored(90.0, 1500.0, "leak", unknowns=33)
+    found = opinion(*structures, held=HeldOutGaps(20.0, 9.0), gaps=(1.0, 0.45, 0.4))
+    assert found.verdict == "leak" and found.effects["leak", "front"] > 0.9
+
+
 @pytest.mark.parametrize(
-    ("level", "held", "walls"),
+    ("gaps", "held", "at_bounds"),
     [
-        (120.0, HeldOutGaps(20.0, 1.1), 0),  # the blocks kept from the fit
-        (0.6, HeldOutGaps(20.0, 12.0), 0),  # the held-out free run: the name mimicked the fitted log only
-        (0.6, HeldOutGaps(20.0, 1.1, kept=0.6), 0),  # the held-out equations
-        (0.6, HeldOutGaps(20.0, 1.1), 3),  # a law bent to its ends
+        ((1.0, 0.7, 0.1), HeldOutGaps(20.0, 14.0), 0),  # whatever acts there closes far more than its shape
+        ((1.0, 1.1, 0.9), HeldOutGaps(20.0, 21.0), 0),  # worse than the refit on the held-out log
+        ((1.0, 0.1, 0.1), HeldOutGaps(20.0, 1.1), 3),  # a law bent to its ends
     ],
 )
-def test_any_measure_of_a_wrong_name_makes_it_unknown(level: float, held: HeldOutGaps, walls: int) -> None:
-    structures = scored(400.0, 3000.0), scored(level, -500.0, "bellows_mode", unknowns=33)
-    assert opinion(*structures, held=held, walls=walls).verdict == "unknown"
-    calm = opinion(structures[0], replace(structures[1], level=0.6), held=HeldOutGaps(20.0, 1.1))
+def test_a_wrong_name_is_unknown(gaps: tuple[float, float, float], held: HeldOutGaps, at_bounds: int) -> None:
+    structures = scored(400.0, 3000.0), scored(0.6, -500.0, "bellows_mode", unknowns=33)
+    assert opinion(*structures, held=held, at_bounds=at_bounds, gaps=gaps).verdict == "unknown"
+    calm = opinion(*structures, held=HeldOutGaps(20.0, 1.1))
     assert calm.verdict == "bellows_mode" and calm.unknown < 0.05
+
+
+def test_named_and_unnamed_stand_beside_each_other() -> None:
+    """Of two effects the one whose place can be closed far better is not what the other one is."""
+    refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "bump_stop", unknowns=36)
+    trusted, wrong = evidence(pair, 1.0, 0.3, 0.28)[0], evidence(pair, 0.5, 0.3, 0.05)[1]
+    found = judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 5.0), [trusted, wrong])
+    assert found.verdict == "leak" and found.effects["leak", "front"] > 0.9 > 0.5 > found.effects["bump_stop", "front"]
 
 
 def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:

@@ -1,0 +1,96 @@
+"""The budget as the diagnosis tells it: shares, laws, probabilities, measured curves, and the remainder's place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, sensitivities
+from pneumo_ros.diagnosis.fit.uncertainty import covariance
+from pneumo_ros.diagnosis.judge.budget import Budget
+from pneumo_ros.diagnosis.judge.closable import Remainder as Closing
+from pneumo_ros.diagnosis.judge.outcome import Outcome
+from pneumo_ros.diagnosis.judge.verdict import Opinion
+from pneumo_ros.diagnosis.model import HasCurves
+from pneumo_ros.diagnosis.result import BudgetEntry, Remainder
+from pneumo_ros.diagnosis.search.growth import of_law
+from pneumo_ros.effects.parameters import Active, Curve, family_of
+
+WORTH = 0.3  # share of what is left that a place must close to be called the remainder's
+DIFFERS = "differs"
+
+
+@dataclass(frozen=True)
+class Shares:
+    """The budget with its remainder, as the result holds it."""
+
+    entries: tuple[BudgetEntry, ...]
+    refit: float
+    remainder: Remainder | None
+    floor: float
+
+
+def budgeted(outcome: Outcome, opinion: Opinion, cov: Array) -> Shares:
+    """Shares of the best structure; ``cov`` of its scaled unknowns."""
+    best, found = outcome.best, outcome.budget
+    entries = [_entry(outcome, opinion, found, law, cov) for law in best.candidate.laws]
+    ranked = tuple(sorted(entries, key=lambda e: -e.share))
+    return Shares(ranked, found.refit, _remainder(outcome, found), found.floor)
+
+
+def _entry(outcome: Outcome, opinion: Opinion, found: Budget, law: Part, cov: Array) -> BudgetEntry:
+    problem, best = outcome.problem, outcome.best
+    parts = of_law(best.candidate, law)
+    where = problem.model.places(Active(*law, ()))
+    share = found.effects[law]
+    name = DIFFERS if len(parts) > 1 else law[0]
+    curve = measured_curve(problem, best, outcome.holdout, parts, cov)
+    side = problem.model.side(Active(*law, ()))
+    return BudgetEntry((family_of(law[0]),), side, where, share.value, share.ci90, name,
+                       float(opinion.effects.get(law, 0.0)), curve)  # fmt: skip
+
+
+def measured_curve(problem: Problem, one: Fit, record: object, parts: Sequence[Part], cov: Array) -> Curve | None:
+    """Curve of some parts of a fitted structure with the band that the covariance of its scaled unknowns gives."""
+    model = problem.model
+    if not isinstance(model, HasCurves) or not parts:
+        return None
+    active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+    own: list[Active] = []
+    columns: list[int] = []
+    first = problem.fixed
+    scale = np.array([p.typical for p in problem.effect_parameters(one.candidate)])
+    for part, acting in zip(one.candidate.parts, active, strict=True):
+        if part in parts:
+            own.append(acting)
+            columns += range(first, first + len(acting.values))
+        first += len(acting.values)
+    size = scale[np.array(columns) - problem.fixed]
+    return model.curve(
+        record, problem.nuisance(one.x), active, own, cov[np.ix_(columns, columns)] * np.outer(size, size)
+    )
+
+
+def _remainder(outcome: Outcome, found: Budget) -> Remainder | None:
+    if found.remainder <= 0.0:
+        return None
+    closing = _place_of_rest(outcome)
+    if closing is None:
+        return Remainder(found.remainder)
+    problem = outcome.problem
+    fitted = sensitivities(problem, closing.fit)
+    curve = measured_curve(problem, fitted, outcome.holdout, closing.parts, covariance(problem, fitted))
+    return Remainder(found.remainder, closing.places, curve)
+
+
+def _place_of_rest(outcome: Outcome) -> Closing | None:
+    """The place at which most of what the structure leaves can be closed."""
+    beside = outcome.closable
+    if not beside.remainders:
+        return None
+    best = beside.remainders[0]
+    return best if best.left < (1.0 - WORTH) * beside.own else None

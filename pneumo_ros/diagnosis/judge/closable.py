@@ -1,0 +1,138 @@
+"""What could be closed: an effect's family against everything at its place, and what nothing in the structure closes.
+
+Three nested models at a place: the law, the family's shape, and whatever may act there. All are fitted to the same logs
+and judged on the held-out one. An effect is what its family's shape closes most of what can be closed there by; what
+is left, and can be closed by no family of the structure, is the remainder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.judge.held_out_runs import held_by
+from pneumo_ros.diagnosis.model import HasCeilings
+from pneumo_ros.diagnosis.search.growth import of_law, reduced, with_parts
+from pneumo_ros.effects.parameters import Active, family_of
+
+STEPS = 4  # iterations of a fit with something added or taken away
+TOGETHER = 3  # places at which a remainder is looked for together
+
+
+@dataclass(frozen=True)
+class EffectEvidence:
+    """What speaks for one effect of a structure, mean squares of the held-out gap above floor and form.
+
+    Attributes
+    ----------
+    law : effect and site
+    places : where it acts, first the one it is blamed on
+    without : gap left when the effect is taken away and the rest fitted again
+    own : gap left by the structure
+    ceiling : gap left when whatever may act at its places is added
+    share : of what the refit leaves, averaged over the orders in which the effects can be added
+    """
+
+    law: Part
+    places: tuple[str, ...]
+    without: float
+    own: float
+    ceiling: float
+    share: float = 1.0
+
+    @property
+    def family(self) -> str:
+        """The mechanism."""
+        return family_of(self.law[0])
+
+    @property
+    def closes(self) -> float:
+        """Share, rms, of what can be closed at its places that its family closes; 0..1."""
+        whole = np.sqrt(self.without) - np.sqrt(min(self.ceiling, self.own))
+        return float(np.clip((np.sqrt(self.without) - np.sqrt(self.own)) / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What can still be closed beside a structure.
+
+    Attributes
+    ----------
+    places : of the contract
+    parts : what was added there
+    fit : the structure with it, on all blocks
+    left : held-out gap left, mean square above floor and form
+    """
+
+    places: tuple[str, ...]
+    parts: tuple[Part, ...]
+    fit: Fit
+    left: float
+
+
+@dataclass(frozen=True)
+class Closable:
+    """Evidence for each effect of the best structure, its remainders, the largest first, and what it leaves itself."""
+
+    effects: tuple[EffectEvidence, ...]
+    remainders: tuple[Remainder, ...]
+    own: float = 0.0
+
+
+def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Sequence[str]) -> Closable:
+    """Judge the best structure's effects against what is closable at their places and elsewhere.
+
+    Parameters
+    ----------
+    problem, best : the structure, fitted to all blocks
+    holdout : the held-out record
+    floor : gap that sensors and the model's stated form leave, as the contract's gap
+    places : further places of the contract where something may be missing, the likeliest first
+    """
+    own = above(problem, best, holdout, floor)
+    remainders: dict[tuple[str, ...], Remainder] = {}
+
+    def added(where: tuple[str, ...]) -> Remainder:
+        if where not in remainders:
+            remainders[where] = _anything(problem, best, holdout, floor, where, own)
+        return remainders[where]
+
+    evidence = []
+    for law in best.candidate.laws:
+        where = problem.model.places(Active(*law, ()))
+        bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
+        without = above(problem, bare, holdout, floor)
+        evidence.append(EffectEvidence(law, where, without, own, added(where).left))
+    if places:  # together, what is left may need them all; alone, one of them may do
+        added(tuple(places[:TOGETHER]))
+        added((places[0],))
+    found = sorted((r for r in remainders.values() if r.left < own), key=lambda r: r.left)
+    return Closable(tuple(evidence), tuple(found), own)
+
+
+def above(problem: Problem, one: Fit, holdout: Any, floor: float) -> float:
+    """Held-out gap, mean square above the floor."""
+    return max(held_by(problem, one, holdout).total ** 2 - floor**2, 0.0)
+
+
+def _anything(problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], own: float) -> Remainder:
+    model = problem.model
+    at = [model.anything_at(place) for place in where] if isinstance(model, HasCeilings) else []
+    parts = tuple(dict.fromkeys(part for parts in at for part in parts))
+    if not parts:
+        return Remainder(where, (), best, own)
+    found = with_parts(problem, best, parts, STEPS, _all(problem))
+    return Remainder(where, parts, found, above(problem, found, holdout, floor))
+
+
+def _fitted(problem: Problem, one: Fit) -> Fit:
+    return one if not one.diverged else fit(problem, Candidate(), np.zeros(problem.fixed), rows=_all(problem))
+
+
+def _all(problem: Problem) -> np.ndarray:
+    return np.ones(len(problem.measured), dtype=bool)

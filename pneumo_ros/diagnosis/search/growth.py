@@ -1,0 +1,175 @@
+"""Beyond laws and pairs: shapes beside laws, further effects one at a time, exchange, and elimination.
+
+A law of the library is seldom the rig's own. So each structure that leads is fitted once more with the shapes of its
+families (:mod:`pneumo_ros.effects.shapes`) beside its laws, and a further effect counts only for what those cannot
+close: the misfit of a law must not pass for a second effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pneumo_ros.arrays import Mask
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.search.competition import Contest, probed, room_for_more, short_fits, varied
+from pneumo_ros.diagnosis.search.screening import all_parts, compatible, promises, trials
+from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
+from pneumo_ros.effects.parameters import SHAPE, Active, family_of
+
+MOST = 6  # effects in a structure
+SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
+SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
+PROBED, SHORT, FINISHED = 10, 3, 2  # further effects probed, fitted shortly, fitted to the end
+STEPS = 5
+IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
+
+
+def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
+    """Fill ``contest.structures``: leading singles and pairs with their shapes, and what grows from the best."""
+    contest.progress(0.82, "shapes")
+    for found, count in zip((contest.singles, contest.pairs), SHAPED, strict=True):
+        contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
+    best = _selected(contest, limits)
+    while further and 0 < best.size < MOST and room_for_more(contest):
+        contest.progress(0.84 + 0.01 * best.size, f"beside {best.fit.candidate.label}")
+        contest.structures += _one_more(contest, best.fit)
+        better = _selected(contest, limits)
+        if better.size <= best.size:
+            break
+        best = better
+    if best.size > 1:
+        _refine(contest, best, limits)
+    best = _selected(contest, limits)
+    if best.size and best.fit.candidate.shapes:
+        contest.structures.append(_without_idle_shapes(contest, best.fit))
+
+
+def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
+    """A structure's laws with the shapes of their families beside them; the fit itself where they have none."""
+    missing = tuple(p for p in shapes_of(problem.model, one.candidate) if p not in one.candidate.parts)
+    if not missing:
+        return one
+    return with_parts(problem, one, missing, iterations)
+
+
+def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
+    """Shapes of the families of a structure, where its laws act."""
+    named = ((f"{family_of(effect)}.{SHAPE}", site) for effect, site in candidate.laws)
+    return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
+
+
+def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
+    """A structure with further parts, which start at nothing."""
+    candidate = Candidate((*one.candidate.parts, *parts))
+    count = len(problem.effect_parameters(Candidate(tuple(parts))))
+    values = [*problem.values(one.candidate, one.x), *np.zeros(count)]
+    start = problem.start(candidate, one.x[: problem.fixed], values)
+    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
+    return found if found.cost < one.cost else one
+
+
+def reduced(
+    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS, rows: Mask | None = None
+) -> Fit:
+    """A structure without some of its parts, fitted from what is left of it."""
+    kept = tuple(part for part in one.candidate.parts if part not in parts)
+    candidate = Candidate(kept)
+    return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
+
+
+def restricted(problem: Problem, one: Fit, candidate: Candidate) -> np.ndarray:
+    """The unknowns of a structure that another, smaller one has as well."""
+    own, first = {}, problem.fixed
+    for part in one.candidate.parts:
+        count = len(problem.effect_parameters(Candidate((part,))))
+        own[part] = one.x[first : first + count]
+        first += count
+    return np.concatenate([one.x[: problem.fixed], *(own[part] for part in candidate.parts)])
+
+
+def _selected(contest: Contest, limits: Thresholds) -> Scored:
+    problem = contest.problem
+    return select(score(problem, contest.refit), [score(problem, f) for f in contest.finalists], limits)
+
+
+def _one_more(contest: Contest, base: Fit) -> list[Fit]:
+    """The best structures with one more effect."""
+    problem, effort = contest.problem, contest.effort
+    laws = base.candidate.laws
+    others = [p for p in all_parts(problem) if all(compatible((law, p)) for law in laws)]
+    leader = base if base.jacobian is not None else fit(problem, base.candidate, base.x, iterations=1)
+    promised = varied(promises(problem, leader, trials(problem, leader, others)), PROBED, 2)
+    chosen = probed(problem, leader, promised)[:SHORT]
+    span = (0.84 + 0.01 * len(laws), 0.85 + 0.01 * len(laws))
+    short = short_fits(contest, leader, chosen, span)
+    ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.short) for one in short[:FINISHED]]
+    return [with_shapes(problem, one, effort.short) for one in ended]
+
+
+def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
+    """Each effect of the best structure against its rivals of the same place, and against its absence."""
+    problem, found = contest.problem, best.fit
+    for law in found.candidate.laws:
+        own = of_law(found.candidate, law)
+        bare = reduced(problem, found, own, iterations=2)
+        if bare.diverged or bare.jacobian is None:
+            continue
+        found = _exchanged(contest, found, bare, law)
+    for law in found.candidate.laws:
+        if len(found.candidate.laws) < 2:
+            break
+        without = reduced(problem, found, of_law(found.candidate, law))
+        more, less = score(problem, found), score(problem, without)
+        if advantage(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
+            found = without
+    if found is not best.fit:
+        contest.structures.append(found)
+
+
+def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
+    """A law with its family's shape at the same site."""
+    return tuple(p for p in candidate.parts if p[1] == law[1] and family_of(p[0]) == family_of(law[0]))
+
+
+def _exchanged(contest: Contest, found: Fit, bare: Fit, law: Part) -> Fit:
+    """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
+    problem, effort = contest.problem, contest.effort
+    others = bare.candidate.laws
+    rivals = [p for p in all_parts(problem) if _rival(problem, law, p) and all(compatible((o, p)) for o in others)]
+    promised = promises(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
+    for short in short_fits(contest, bare, probed(problem, bare, promised)[:1], (0.9, 0.9)):
+        other = with_shapes(problem, short)
+        if score(problem, other).price < score(problem, found).price:
+            contest.structures.append(other)
+            return other
+    return found
+
+
+def _rival(problem: Problem, law: Part, other: Part) -> bool:
+    """Whether two effects of unlike families act at one site and are blamed on the same place."""
+    if family_of(law[0]) == family_of(other[0]) or law[1] != other[1]:
+        return False
+    one, two = (problem.model.places(Active(*p, ())) for p in (law, other))
+    return one[:1] == two[:1]
+
+
+def _without_idle_shapes(contest: Contest, found: Fit) -> Fit:
+    """The structure without those shapes that the kept blocks do not miss: there the law is the rig's."""
+    problem = contest.problem
+    for bare in (one for one in contest.laws if one.candidate.parts == found.candidate.laws):
+        if _does(problem, bare, found):
+            return bare
+    for part in found.candidate.shapes:
+        less = reduced(problem, found, (part,), iterations=STEPS)
+        found = less if _does(problem, less, found) else found
+    return found
+
+
+def _does(problem: Problem, less: Fit, more: Fit) -> bool:
+    """Whether a smaller structure predicts the kept blocks as well and costs no more."""
+    one, other = score(problem, less), score(problem, more)
+    return one.level <= other.level * (1.0 + SAME) + IDLE and one.price < other.price + 1.0

@@ -1,0 +1,1 @@
+"""Shapes of the families: sums of simple atoms that any law of a kind lies in, run and fitted like an effect."""

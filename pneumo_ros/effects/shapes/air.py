@@ -1,0 +1,95 @@
+"""Atoms of a spring's air balance: leaks, errors of the orifices, heat from the wall, volume that is not V(h).
+
+A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.plant.air_spring import MEAN_AREA
+from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, INCH
+
+REFERENCE = 3e5  # Pa absolute
+LAMINAR = REFERENCE / (REFERENCE**2 - ATMOSPHERE**2)  # a long gap with the flow of a hole at the reference
+OPENS = (2.5e5, 3.5e5)  # Pa above which a leak begins
+USUAL = 1e-3  # kg/s, a valve's usual flow
+MIDDLE = 1.8 * INCH  # m
+SWING = 5e-3  # m
+HEAT_CAPACITY = 1005.0  # J/(kg K), of air at constant pressure
+MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
+
+ATOMS = (
+    Atom("leak hole", "m2", 2e-7),
+    Atom("leak gap", "m2", 2e-7),
+    *(Atom(f"leak above {p:g} Pa", "m2", 2e-7) for p in OPENS),
+    Atom("inlet", "1", 0.05, signed=True),
+    Atom("inlet over ratio", "1", 0.05, signed=True),
+    Atom("inlet over flow", "1", 0.05, signed=True),
+    Atom("outlet", "1", 0.05, signed=True),
+    Atom("outlet over ratio", "1", 0.05, signed=True),
+    Atom("wall", "W/K", 0.2),
+    Atom("wall over pressure", "W/K", 0.2),
+    *(Atom(f"wall memory {t:g} s", "W/K", 0.2) for t in MEMORIES),
+    Atom("enthalpy", "1", 0.3),
+    Atom("volume", "1", 0.03, signed=True),
+    Atom("volume over height", "1", 0.03, signed=True),
+    Atom("volume over pressure", "1", 0.03, signed=True),
+    Atom("constant", "kg/s", 3e-5, signed=True),
+)
+State = tuple[float, float, float, float]
+Values = tuple[float, ...]
+
+
+@njit(cache=True, error_model="numpy")
+def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
+    """Air and wall at the supply's temperature."""
+    t = air.temperature
+    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """The air's mass by its flows, and the walls that follow its temperature."""
+    t = air.temperature
+    return (
+        max(z[0] + dt * (air.inflow - air.outflow), 1e-7), t + (z[1] - t) * math.exp(-dt / 0.15),
+        t + (z[2] - t) * math.exp(-dt / 0.8), t + (z[3] - t) * math.exp(-dt / 4.0),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def air(air: Air, z: State, p: Values) -> float:
+    """Pressure rate of all atoms together, Pa/s."""
+    ratio, pressure, t = air.pressure / air.supply, air.pressure / REFERENCE, air.temperature
+    cold = math.sqrt(air.supply_temperature / t)
+    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure) * cold
+    leak = p[0] + p[1] * gap
+    leak += p[2] * max(0.0, air.pressure - 2.5e5) / 1e5 + p[3] * max(0.0, air.pressure - 3.5e5) / 1e5
+    flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
+    flow -= air.outflow * (p[7] + p[8] * (ATMOSPHERE / air.pressure - 0.5)) + leak * air.escape
+    flow += p[18]
+    true = air.pressure * air.volume / (GAS_CONSTANT * z[0])
+    heat = (p[9] + p[10] * pressure) * (air.supply_temperature - true)
+    heat += p[11] * (z[1] - t) + p[12] * (z[2] - t) + p[13] * (z[3] - t)
+    heat += p[14] * HEAT_CAPACITY * air.inflow * (air.supply_temperature - t)
+    through = GAS_CONSTANT * t
+    nominal = air.exponent * (through * (air.inflow - air.outflow) - air.pressure * MEAN_AREA * air.rate) / air.volume
+    extra = p[15] + p[16] * (air.height - MIDDLE) / SWING + p[17] * (pressure - 1.0)
+    return (air.exponent * through * flow + (air.exponent - 1.0) * heat) / air.volume - extra * nominal
+
+
+AIR = Term("air", PlantTerm(states=4, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
+EFFECTS = (
+    AIR.shape("leak", ["leak"], "a leak of any law: grows with the pressure"),
+    AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),
+    AIR.shape("heat_transfer", ["wall", "enthalpy"], "heat from the wall and with the inflow, of any law"),
+    AIR.shape("dead_volume", ["volume"], "a volume that is not V(h), of any law"),
+    AIR.anything(),
+)

@@ -1,0 +1,130 @@
+"""Atoms of a force between body and axle: friction, damping, stops, hysteresis, errors of the spring.
+
+Positive upwards on the body. Friction and damping are saturating ramps and powers of the strut's rate, each for
+extension and compression; what sticks, and rate-independent hysteresis, are sliders in parallel (Iwan 1966, "A
+distributed-element model for hysteresis and its steady-state dynamic response", J. Appl. Mech. 33): elastic up to their
+slack, then slipping at constant force.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.units import INCH
+
+RATES = (0.012, 0.04, 0.13, 0.4)  # m/s at which a ramp saturates; shorter ones stick, which sliders do
+SLACKS = (6e-5, 3e-4, 1.2e-3, 4e-3, 1.2e-2)  # m of travel before a slider slips
+STOPS = (0.0335, 0.036, 0.0385, 0.041, 0.043)  # m, heights below which a stop's ramps begin
+STRAPS = (0.0485, 0.051, 0.0535)  # m, heights above which a strap's begin
+TOUCHES = (0.041, 0.0365)  # m, heights below which a stop damps
+LAGS = (0.02, 0.1, 0.5)  # s, memories of the rubber
+MIDDLE = 1.8 * INCH  # m, design height
+SWING = 5e-3  # m, travel of a session
+GAUGE = 2.5e5  # Pa, between the two ends' static pressures
+TOUCHING = 1e-3  # m over which a stop's damping sets in
+
+State = tuple[float, float, float, float, float, float, float, float]
+
+ATOMS = (
+    *(Atom(f"friction_out {r:g} m/s", "N", 3.0) for r in RATES),
+    Atom("damping_out", "N s/m", 20.0),
+    Atom("damping_out squared", "N s2/m2", 60.0),
+    *(Atom(f"friction_in {r:g} m/s", "N", 3.0) for r in RATES),
+    Atom("damping_in", "N s/m", 20.0),
+    Atom("damping_in squared", "N s2/m2", 60.0),
+    Atom("load_friction", "N", 3.0),
+    *(Atom(f"slider {s:g} m", "N", 3.0) for s in SLACKS),
+    *(Atom(f"stop {h:g} m", "N/m", 1e4) for h in STOPS),
+    *(Atom(f"strap {h:g} m", "N/m", 1e4) for h in STRAPS),
+    *(Atom(f"touch {h:g} m", "N s/m", 100.0) for h in TOUCHES),
+    Atom("touch_in", "N s/m", 100.0),
+    Atom("area", "1", 0.02, signed=True),
+    Atom("area slope", "1", 0.02, signed=True),
+    Atom("area curvature", "1", 0.02, signed=True),
+    Atom("area pressure", "1", 0.02, signed=True),
+    Atom("stiffness", "N/m", 500.0, signed=True),
+    Atom("stiffness odd", "N", 2.0, signed=True),
+    *(Atom(f"memory {t:g} s", "N/m", 500.0) for t in LAGS),
+    Atom("constant", "N", 2.0, signed=True),
+)
+Values = tuple[float, ...]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _slid(z: float, move: float) -> float:
+    """A slider's stretch over its slack after a move."""
+    return min(max(z + move, -1.0), 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
+    """Sliders free of force, memories at the strut's height."""
+    return (0.0, 0.0, 0.0, 0.0, 0.0, strut.height, strut.height, strut.height)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """Sliders and memories one step later, at held rate and height."""
+    move, h = strut.rate * dt, strut.height
+    return (
+        _slid(z[0], move / 6e-5), _slid(z[1], move / 3e-4), _slid(z[2], move / 1.2e-3), _slid(z[3], move / 4e-3),
+        _slid(z[4], move / 1.2e-2),
+        h + (z[5] - h) * math.exp(-dt / 0.02), h + (z[6] - h) * math.exp(-dt / 0.1),
+        h + (z[7] - h) * math.exp(-dt / 0.5),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: State, p: Values) -> float:
+    """Sum of the atoms."""
+    v, h, load = strut.rate, strut.height, strut.gauge / GAUGE
+    out = p[38]
+    if v > 0.0:
+        out -= p[0] * min(v / 0.012, 1.0) + p[1] * min(v / 0.04, 1.0) + p[2] * min(v / 0.13, 1.0)
+        out -= p[3] * min(v / 0.4, 1.0) + p[4] * v + p[5] * v * v
+    else:
+        w = -v
+        out += p[6] * min(w / 0.012, 1.0) + p[7] * min(w / 0.04, 1.0) + p[8] * min(w / 0.13, 1.0)
+        out += p[9] * min(w / 0.4, 1.0) + p[10] * w + p[11] * w * w
+    out -= p[12] * load * min(max(v / 0.012, -1.0), 1.0)
+    out -= p[13] * z[0] + p[14] * z[1] + p[15] * z[2] + p[16] * z[3] + p[17] * z[4]
+    if h < 0.043:
+        out += p[18] * max(0.0, 0.0335 - h) + p[19] * max(0.0, 0.036 - h) + p[20] * max(0.0, 0.0385 - h)
+        out += p[21] * max(0.0, 0.041 - h) + p[22] * (0.043 - h)
+        near, far = min(max((0.041 - h) / TOUCHING, 0.0), 1.0), min(max((0.0365 - h) / TOUCHING, 0.0), 1.0)
+        out -= (p[26] * v + p[28] * min(v, 0.0)) * near + p[27] * v * far
+    if h > 0.0485:
+        out -= p[23] * (h - 0.0485) + p[24] * max(0.0, h - 0.051) + p[25] * max(0.0, h - 0.0535)
+    x = (h - MIDDLE) / SWING
+    out += strut.gauge * strut.area * (p[29] + p[30] * x + p[31] * x * x + p[32] * (load - 1.0))
+    out += p[33] * (h - MIDDLE) + p[34] * x * abs(x)
+    return out - p[35] * (h - z[5]) - p[36] * (h - z[6]) - p[37] * (h - z[7])
+
+
+FORCE = Term("force", PlantTerm(states=8, start=start, advance=advance, force=force), ATOMS, ENDS, ("{end}_force",))
+EFFECTS = (
+    FORCE.shape(
+        "coulomb_friction",
+        [f"friction_out {r:g} m/s" for r in RATES[:3]] + [f"friction_in {r:g} m/s" for r in RATES[:3]]
+        + ["load_friction", *(f"slider {s:g} m" for s in SLACKS[:3])],
+        "dry friction of any law: saturating in rate, with or without sticking",
+    ),
+    FORCE.shape(
+        "viscous_damping",
+        [f"friction_out {r:g} m/s" for r in RATES[2:]] + [f"friction_in {r:g} m/s" for r in RATES[2:]]
+        + ["damping_out", "damping_in"],
+        "damping of any law: grows with rate, unlike out and in",
+    ),
+    FORCE.shape(
+        "bellows_hysteresis", [f"slider {s:g} m" for s in SLACKS[2:]], "hysteresis of any law: sliders of every length"
+    ),
+    FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height and may damp"),
+    FORCE.shape("effective_area_error", ["area"], "an area error of any law over height and pressure"),
+    FORCE.anything(),
+)  # fmt: skip

@@ -1,0 +1,166 @@
+"""Atoms of what happens to a signal on its way: valves, exciter and sensors.
+
+A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead
+zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a
+polynomial of its own reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numba import njit
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.contract import (
+    ENDS,
+    PRESSURES_OR_BOTH,
+    Effect,
+    Ends,
+    Inputs,
+    Memory,
+    Values,
+    by_column,
+)
+from pneumo_ros.effects.filters import delayed_hold, first_order_line, lagged_hold
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.shapes.atoms import Atom, amplitude
+from pneumo_ros.rig.channels import DISPLACEMENTS
+
+Filter = Callable[[Array, float, Memory], tuple[Array, Memory]]
+CRITICAL = 1.0  # damping ratio of a lag's two equal poles
+VALVE_LAGS = (0.002, 0.006, 0.015, 0.04)  # s, of each of two equal poles
+DELAYS = (0.004, 0.008, 0.016, 0.032, 0.064)  # s
+CORNERS = (2e-8, 6e-8, 1.5e-7, 4e-7)  # m2
+PLAYS = (2e-8, 8e-8, 2e-7)  # m2, half width
+EXCITER_LAGS = (0.002, 0.006, 0.02)  # s
+SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
+SHARE = 0.3
+PRESSURE_MIDDLE, PRESSURE_SWING = 3.5e5, 5e4  # Pa absolute
+LVDT_SWING = 0.02  # m
+
+
+def _lag(tau: float) -> Filter:
+    return lambda u, period, memory: lagged_hold(u, period, tau, CRITICAL, memory)
+
+
+def _delay(tau: float) -> Filter:
+    return lambda u, period, memory: delayed_hold(u, period, tau, memory)
+
+
+def _line(tau: float) -> Filter:
+    return lambda u, period, memory: first_order_line(u, period, tau, memory)
+
+
+@njit(cache=True)
+def _played(u: Array, half: float, held: float) -> Array:
+    y = np.empty_like(u)
+    for i in range(u.shape[0]):
+        held = min(max(held, u[i] - half), u[i] + half)
+        y[i] = held
+    return y
+
+
+def _play(half: float) -> Filter:
+    def passed(u: Array, period: float, memory: Memory) -> tuple[Array, Memory]:
+        y = _played(np.ascontiguousarray(u), half, float(u[0]) if memory is None else memory)
+        return y, float(y[-1])
+
+    return passed
+
+
+def _corner(end: float) -> Filter:
+    return lambda u, period, memory: (u - np.minimum(u, end), None)
+
+
+def mixed(filters: Sequence[Filter], u: Array, period: float, shares: Values, memory: Memory) -> tuple[Array, Memory]:
+    """A signal of which shares pass through filters, (N,); a filter of no share is passed over."""
+    kept, out = list(memory or [None] * len(filters)), u.copy()
+    for k, (through, share) in enumerate(zip(filters, shares, strict=True)):
+        if share != 0.0:
+            y, kept[k] = through(u, period, kept[k])
+            out += share * (y - u)
+    return out, tuple(kept)
+
+
+def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParameter, ...]:
+    low = -2.0 if every_sign else 0.0
+    return tuple(EffectParameter(n, "1", low, 2.0, SHARE, size=True, spread=10.0) for n in names)
+
+
+def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool) -> Effect:
+    def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
+        columns = [c for end in ends.columns for c in ((end,) if inlets_only else (end, 2 + end))]
+        commands, memory = by_column(
+            lambda u, kept: mixed(filters, u, period, values, kept), given.commands, columns, memory
+        )
+        return given._replace(commands=np.maximum(commands, 0.0)), memory
+
+    parameters = _shares(names, name.startswith("anything"))
+    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs)
+
+
+def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
+    filters = [_line(t) for t in EXCITER_LAGS]
+
+    def driven(u: Array, kept: Memory) -> tuple[Array, Memory]:
+        out, kept = mixed(filters, u, period, values[1:], kept)
+        return out + values[0] * u, kept
+
+    road, memory = by_column(driven, given.road, ends.columns, memory)
+    return given._replace(road=road), memory
+
+
+def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swing: float, powers: Sequence[int],
+            lags: Sequence[float], unit: str) -> Effect:  # fmt: skip
+    filters, count = [_line(t) for t in lags], len(powers)
+
+    def error(x: Array, values: Values) -> Array:
+        z = (x - middle) / swing
+        return np.asarray(swing * sum(v * z**power for v, power in zip(values[:count], powers, strict=True)))
+
+    def outputs(
+        given: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+    ) -> tuple[Array, Memory]:
+        def shown(x: Array, kept: Memory) -> tuple[Array, Memory]:
+            late, kept = mixed(filters, x, period, values[count:], kept)
+            return late + error(x, values), kept
+
+        return by_column(shown, given, channels, memory)
+
+    def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
+        for channel in channels:  # the error is small: once is enough for a start
+            measured[:, channel] -= error(measured[:, channel], values)
+        return measured
+
+    atoms = [Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers]
+    every_sign = name.startswith("anything")
+    parameters = (*(amplitude(atom) for atom in atoms), *_shares([f"lag {t:g} s" for t in lags], every_sign))
+    return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo)
+
+
+LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
+ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c in PLAYS)]
+SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
+ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
+EFFECTS = (
+    _valve("valve_lag.shape", "a slow valve of any law: lags of every length", [*LAG_NAMES, DELAY_NAMES[0]],
+           [*SLOW, LATE[0]], False),
+    _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
+    _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
+           True),
+    Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),
+           (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
+            *_shares([f"lag {t:g} s" for t in EXCITER_LAGS])), inputs=_exciter),
+    _sensor("lvdt_scale.shape", "a sensitivity that is off, or bends", DISPLACEMENTS, 0.0, LVDT_SWING,
+            (1, 2, 3), (), "m"),
+    _sensor("pressure_scale.shape", "a sensitivity that is off, or bends", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
+            PRESSURE_SWING, (0, 1, 2), (), "Pa"),
+    _sensor("pressure_lag.shape", "a late pressure sensor of any law", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
+            PRESSURE_SWING, (), SENSOR_LAGS, "Pa"),
+    _sensor("anything.lvdt", "whatever the sensor does", DISPLACEMENTS, 0.0, LVDT_SWING, (0, 1, 2, 3),
+            SENSOR_LAGS[1:3], "m"),
+    _sensor("anything.pressure", "whatever the sensor does", PRESSURES_OR_BOTH, PRESSURE_MIDDLE, PRESSURE_SWING,
+            (0, 1, 2, 3), SENSOR_LAGS, "Pa"),
+)  # fmt: skip

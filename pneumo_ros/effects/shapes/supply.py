@@ -1,0 +1,59 @@
+"""Atoms of a supply that sags with the flow drawn from it: memories of flow and of its square (a hose, an orifice)."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import RIG
+from pneumo_ros.effects.hooks import Air
+from pneumo_ros.effects.shapes.atoms import Atom, Term
+
+TIMES = (0.01, 0.05, 0.25, 1.2, 6.0)  # s
+SQUARE_TIMES = (0.02, 0.5, 4.0)  # s
+USUAL = 2e-3  # kg/s, usual flow of both springs
+DEEPEST = 4e5  # Pa: keeps a wild trial of the fit from a negative supply
+
+ATOMS = (
+    *(Atom(f"droop {t:g} s", "Pa s/kg", 5e6) for t in TIMES),
+    *(Atom(f"droop squared {t:g} s", "Pa s/kg", 5e6) for t in SQUARE_TIMES),
+    Atom("offset", "Pa", 5e3, signed=True),
+)
+State = tuple[float, float, float, float, float, float, float, float]
+Values = tuple[float, ...]
+
+
+@njit(cache=True, error_model="numpy")
+def start(front: Air, rear: Air, p: Values) -> State:
+    """Steady at the first flow."""
+    w = front.inflow + rear.inflow
+    return (w, w, w, w, w, w * w, w * w, w * w)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, front: Air, rear: Air, dt: float, p: Values) -> State:
+    """Memories at held flow, exact."""
+    w = front.inflow + rear.inflow
+    s = w * w
+    return (
+        w + (z[0] - w) * math.exp(-dt / 0.01), w + (z[1] - w) * math.exp(-dt / 0.05),
+        w + (z[2] - w) * math.exp(-dt / 0.25), w + (z[3] - w) * math.exp(-dt / 1.2),
+        w + (z[4] - w) * math.exp(-dt / 6.0), s + (z[5] - s) * math.exp(-dt / 0.02),
+        s + (z[6] - s) * math.exp(-dt / 0.5), s + (z[7] - s) * math.exp(-dt / 4.0),
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def supply(z: State, p: Values) -> float:
+    """Pa below the regulated supply."""
+    out = p[8] + p[0] * z[0] + p[1] * z[1] + p[2] * z[2] + p[3] * z[3] + p[4] * z[4]
+    out += (p[5] * z[5] + p[6] * z[6] + p[7] * z[7]) / USUAL
+    return min(max(out, -DEEPEST), DEEPEST)
+
+
+SUPPLY = Term(
+    "supply", PlantTerm(states=8, start=start, advance=advance, supply=supply, shared=True), ATOMS, RIG, ("supply",)
+)
+EFFECTS = (SUPPLY.shape("supply_droop", ["droop"], "a supply that sags by any law"), SUPPLY.anything())
