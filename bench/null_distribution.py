@@ -106,7 +106,7 @@ def win(poorer: Scored, richer: Scored) -> tuple[float, float, float, float]:
 
 def best_of(contest: Contest, size: int) -> Scored | None:
     """The structure of that many effects with the lowest level on the selection blocks."""
-    scored = [score(contest.problem, f) for f in contest.finalists if len(f.candidate.parts) == size]
+    scored = [score(contest.problem, f) for f in contest.finalists if len(f.candidate.laws) == size]
     return min(scored, key=lambda s: s.level, default=None)
 
 

@@ -20,7 +20,7 @@ from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Prob
 from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.search.screening import Promise, all_parts, compatible, promises, trials, visibility
-from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level, score
+from pneumo_ros.diagnosis.search.selection import FORM, TOLL, Thresholds, noise_level, score, used_unknowns
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.errors import InputError
 
@@ -89,9 +89,13 @@ class Contest:
 
     @property
     def finalists(self) -> list[Fit]:
-        """Every converged structure; of those with the same laws the last one made."""
-        latest = {one.candidate.laws: one for one in (*self.laws, *self.structures)}
-        return list(latest.values())
+        """Every converged structure; of those with the same laws, with and without shapes, the one of lowest price."""
+        best: dict[tuple[Part, ...], Fit] = {}
+        for one in (*self.laws, *self.structures):
+            rival = best.get(one.candidate.laws)
+            if rival is None or _price(one) < _price(rival):
+                best[one.candidate.laws] = one
+        return list(best.values())
 
     @property
     def laws(self) -> list[Fit]:
@@ -102,6 +106,11 @@ class Contest:
     def best(self) -> Fit:
         """Lowest training cost of all."""
         return min([self.refit, *self.finalists], key=lambda f: f.cost)
+
+
+def _price(one: Fit) -> float:
+    """Training cost with the toll of what was fitted, and a little for each shape: a law that does as well wins."""
+    return one.cost + TOLL * used_unknowns(one) + len(one.candidate.shapes)
 
 
 def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Contest:

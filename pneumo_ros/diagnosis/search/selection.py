@@ -21,6 +21,7 @@ from pneumo_ros.paths import share_file
 
 FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
 TOLL = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
+UNUSED = 1e-3  # of a typical amplitude: an atom that stands at nothing
 SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
 
 
@@ -106,12 +107,12 @@ class Scored:
         """
         laws = self.fit.candidate.laws
         wide = sum(site == "both" for _, site in laws)
-        return self.fit.cost + TOLL * (self.unknowns + wide)
+        return self.fit.cost + TOLL * (used_unknowns(self.fit) + wide)
 
-    @property
-    def unknowns(self) -> int:
-        """Unknowns of the fit; of the atoms of a shape only those that are used."""
-        return int(np.count_nonzero(self.fit.x != 0.0)) if self.fit.candidate.shapes else len(self.fit.x)
+
+def used_unknowns(fit: Fit) -> int:
+    """Unknowns of a fit; of the atoms of a shape only those that are used."""
+    return int(np.count_nonzero(np.abs(fit.x) > UNUSED)) if fit.candidate.shapes else len(fit.x)
 
 
 def score(problem: Problem, fit: Fit) -> Scored:
