@@ -12,14 +12,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.app import App
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
     from pneumo_ros.casemaker.scoring.results import Found
 
-app = typer.Typer(
-    no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
-)
+app = App(no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld.")
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the set: manifest.json, cases/, labels.json.")]
 Workers = Annotated[int, typer.Option(help="Local processes.", min=1)]

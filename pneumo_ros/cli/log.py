@@ -15,13 +15,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
+
 if TYPE_CHECKING:
     from pneumo_ros.log.comparison import Comparison
     from pneumo_ros.log.inspection import Report, Timing, TopicReport
     from pneumo_ros.log.repair import Recovery
     from pneumo_ros.log.salvage import Salvaged
 
-app = typer.Typer(
+app = App(
     add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
 )
 console = Console()

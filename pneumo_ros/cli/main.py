@@ -26,6 +26,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.app import App
 from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
@@ -90,7 +91,7 @@ class LazyGroup(TyperGroup):
             raise typer.Exit(INTERRUPTED) from None
 
 
-app = typer.Typer(
+app = App(
     cls=LazyGroup,
     no_args_is_help=True,
     add_completion=False,

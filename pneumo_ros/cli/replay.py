@@ -14,6 +14,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.errors import InputError
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from pneumo_ros.session.rerun import Rerun
     from pneumo_ros.session.what_if import Row
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 console = Console()
 DIFFERS = 1
 

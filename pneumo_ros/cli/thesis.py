@@ -11,10 +11,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
+
 if TYPE_CHECKING:
     from pneumo_ros.thesis.report import Chapter
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 console = Console()
 
 

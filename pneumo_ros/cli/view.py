@@ -15,9 +15,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.errors import InputError
 
-app = typer.Typer(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
+app = App(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
 console = Console()
 END_PATIENCE = 5.0  # s a dashboard has to close its connections
 

@@ -197,7 +197,7 @@ _HELLO_SIZE = _HELLO_FIXED.size + INPUT_COUNT * _INPUT.size + OUTPUT_COUNT * _OU
 _STATES = {state.value: state for state in DeviceState}
 _FLAGS = tuple(SampleFlag(value) for value in range(4))
 
-BODY_SIZE = {
+BODY_SIZE: dict[int, int] = {
     Kind.HELLO_REQUEST: _HELLO_REQUEST.size,
     Kind.HELLO: _HELLO_SIZE,
     Kind.SAMPLE: _SAMPLE.size,
