@@ -22,6 +22,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
@@ -29,7 +30,7 @@ from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 from pneumo_ros.nodes.interfaces import message_class
-from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
+from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import LoopTiming
@@ -156,6 +157,22 @@ class RigNode(Node):
         self._setup.publish(String(data=text))
 
     # -- topics ----------------------------------------------------------------------------------------------------
+
+    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
+        """As rclpy's; the quality of service can be overridden by parameters."""
+        if not hasattr(self, "lockstep"):  # rclpy's own, while the node is being made
+            return super().create_publisher(*args, **options)
+        options.setdefault("qos_overriding_options", overriding(self.lockstep))
+        with refused_overrides(self.get_name(), args[1]):
+            return super().create_publisher(*args, **options)
+
+    def create_subscription(self, *args: Any, **options: Any) -> Subscription:
+        """As rclpy's; the quality of service can be overridden by parameters."""
+        if not hasattr(self, "lockstep"):
+            return super().create_subscription(*args, **options)
+        options.setdefault("qos_overriding_options", overriding(self.lockstep))
+        with refused_overrides(self.get_name(), args[1]):
+            return super().create_subscription(*args, **options)
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the table."""
