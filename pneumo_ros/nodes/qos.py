@@ -52,10 +52,14 @@ def refused_overrides(node: str, topic: str) -> Iterator[None]:
     except (InvalidQosOverridesError, RuntimeError) as error:
         if "QoS override" not in str(error):
             raise
-        raise InputError(f"refused ({error})", where=node, key=f"qos_overrides.{topic}",
-                         allowed="history keep_last or keep_all, depth from 1, reliability reliable or best_effort, the latter "
-                         "not in lockstep, durability volatile or transient_local",
-                         remedy="correct or remove the override") from error  # fmt: skip
+        raise InputError(
+            f"refused ({error})",
+            where=node,
+            key=f"qos_overrides.{topic}",
+            allowed=X
+            "durability volatile or transient_local",
+            remedy="correct or remove the override",
+        ) from error
 
 
 def publisher_qos(flow: Flow, lockstep: bool) -> QoSProfile:
