@@ -56,8 +56,8 @@ def refused_overrides(node: str, topic: str) -> Iterator[None]:
             f"refused ({error})",
             where=node,
             key=f"qos_overrides.{topic}",
-            allowed=X
-            "durability volatile or transient_local",
+            allowed="history keep_last or keep_all; depth 1 or more; reliability reliable, or best_effort but not in "
+            "lockstep; durability volatile or transient_local",
             remedy="correct or remove the override",
         ) from error
 
