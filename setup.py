@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 NAME = "pneumo_ros"
 
 # Every node is an executable of its own: `ros2 run pneumo_ros <name>`, and a console script under pip.
-NODES = ["road_profile", "plant", "daq", "estimator", "controller", "session_recorder"]
+NODES = ["road_profile", "plant", "daq", "estimator", "controller", "session_recorder", "joint_states"]
 
 # `colcon test` looks for pytest in the extra of this name.
 TESTING = [

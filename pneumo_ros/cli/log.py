@@ -129,6 +129,21 @@ def compare(
 
 
 @app.command()
+def scene(
+    log: LogPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Log to write (.mcap).")],
+) -> None:
+    """The rig's motion as joint states, transforms and URDF, for viewers that show a robot in 3D."""
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.log.scene import write_scene
+
+    count = write_scene(read_log(log), output)
+    console.print(
+        f"{output}  {count} instants; layout config/layouts/foxglove_3d.json", highlight=False, soft_wrap=True
+    )
+
+
+@app.command()
 def report(
     log: LogPath,
     output: Annotated[

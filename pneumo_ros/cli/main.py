@@ -36,7 +36,7 @@ VERBS: dict[str, str] = {
     "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
-    "log": "Look into a session log: info, validate, recover, export, compare, report.",
+    "log": "Look into a session log: info, validate, recover, export, compare, scene, report.",
     "view": "Show a session in the browser: a log played back, or a running session.",
     "emulate": "Open a pseudo-terminal that behaves like the rig, with faults to inject.",
     "calibrate": "Fit a sensor's calibration from points, or check what is in force.",

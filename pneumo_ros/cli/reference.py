@@ -1,4 +1,4 @@
-"""Write what is made from tables: docs/topics.md, docs/parameters.md and config/layouts/.
+"""Write what is made from tables: docs/topics.md, docs/parameters.md, config/layouts/ and urdf/.
 
 `make docs` runs it; tests hold the files up to date.
 """
@@ -13,6 +13,8 @@ from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.sheet import effects_page
 from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
+from pneumo_ros.rig import load_rig
+from pneumo_ros.rig.urdf import urdf
 
 TOPICS_HEAD = """# Topics
 
@@ -60,13 +62,14 @@ def documents() -> dict[str, str]:
 
 
 def main() -> None:
-    """Write docs/ and config/layouts/ of this checkout."""
+    """Write docs/, config/layouts/ and urdf/ of this checkout."""
     root = Path(__file__).resolve().parents[2]
     for name, text in documents().items():
         (root / "docs" / name).write_text(text, encoding="utf-8")
     for name, make in LAYOUTS.items():
         (root / "config" / "layouts").mkdir(exist_ok=True)
         (root / "config" / "layouts" / name).write_text(make(), encoding="utf-8")
+    (root / "urdf" / "half_car.urdf").write_text(urdf(load_rig()), encoding="utf-8")
 
 
 if __name__ == "__main__":
