@@ -147,10 +147,12 @@ def test_tests_run_beside_launch_testing_s_plugin(tmp_path: Path) -> None:
     (described / "entry_points.txt").write_text("[pytest11]\nlaunch_testing = legacy_hooks\n")
     (tmp_path / "test_one.py").write_text("def test_one():\n    pass\n")
     (tmp_path / "own.ini").write_text("[pytest]\n")
+    # Not what another pytest was told by its environment: colcon gives it the tests to run that way.
+    environment = {key: value for key, value in os.environ.items() if key != "PYTEST_ADDOPTS"}
+    environment["PYTHONPATH"] = str(tmp_path)
     codes = []
     for config in (ROOT / "pyproject.toml", tmp_path / "own.ini"):
         command = [sys.executable, "-m", "pytest", "-c", str(config), str(tmp_path / "test_one.py")]
-        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
         codes.append(subprocess.run(command, env=environment, capture_output=True, check=False).returncode)
     assert codes[0] == 0 and codes[1] != 0
 

@@ -216,6 +216,12 @@ class RigNode(Node):
 
     # -- health ----------------------------------------------------------------------------------------------------
 
+    @property
+    def hardware_id(self) -> str:
+        """Which rig a status is about (REP 107): the rig's name, where a node knows no closer one."""
+        rig = getattr(self, "rig", None)
+        return str(rig.name) if rig is not None else str(self.values["rig"]) or "half-car-rig"
+
     def timed(self, start_ns: int) -> None:
         """Account for one step that began at ``start_ns`` (monotonic) and ends now."""
         self.timing.mark(start_ns, time.monotonic_ns())
@@ -244,7 +250,7 @@ class RigNode(Node):
         self._events.publish(self._array(level, self.get_name(), message, {"code": code, **(values or {})}))
 
     def _array(self, level: bytes, name: str, message: str, values: Mapping[str, str]) -> DiagnosticArray:
-        status = DiagnosticStatus(level=level, name=name, message=message, hardware_id="half-car-rig")
+        status = DiagnosticStatus(level=level, name=name, message=message, hardware_id=self.hardware_id)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         out = DiagnosticArray(status=[status])
         out.header.stamp = self.get_clock().now().to_msg()

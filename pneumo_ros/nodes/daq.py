@@ -84,6 +84,13 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.course = SessionCourse(self)
 
     @property
+    def hardware_id(self) -> str:
+        """The board's serial number once it has answered: which hardware a status is about (REP 107)."""
+        driver = getattr(self, "driver", None)
+        intake = driver.core.intake if driver is not None else None
+        return intake.hello.serial_number if intake is not None else super().hardware_id
+
+    @property
     def state_label(self) -> str:
         """Life cycle state: unconfigured, inactive, active or finalized."""
         return str(self._state_machine.current_state[1])

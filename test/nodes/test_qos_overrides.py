@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("rclpy")
 import rclpy
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from helpers import sessions
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -25,6 +26,7 @@ from pneumo_ros.cli.run import node_tables
 from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.estimator import EstimatorNode
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode
+from pneumo_ros.rig import load_rig
 from pneumo_ros.session.plan import read_config
 
 STATE = "/estimate/state"
@@ -161,3 +163,20 @@ def test_dumped_parameters_start_the_same_node_again(context: Context, tmp_path:
     assert read["rate_hz"] == 400.0 and read[f"qos_overrides.{STATE}.publisher.depth"] == 9
     third = EstimatorNode(context, read)
     assert dumped(context, third) == document
+
+
+def test_diagnostics_name_part_and_hardware(context: Context) -> None:
+    """REP 107: `node: part`, a hardware id, levels OK to STALE."""
+    node = EstimatorNode(context, REAL_TIME)
+    observer = rclpy.create_node("observer", context=context)
+    heard: list[DiagnosticArray] = []
+    observer.create_subscription(DiagnosticArray, "/diagnostics", heard.append, 10)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    executor.add_node(observer)
+    end = time.monotonic() + 15.0
+    while not heard and time.monotonic() < end:
+        executor.spin_once(timeout_sec=0.1)
+    status = heard[0].status[0]
+    assert status.name == "estimator: loop" and status.hardware_id == load_rig().name and heard[0].header.stamp.sec > 0
+    assert status.level in (b"\x00", b"\x01", b"\x02", b"\x03") and status.message
