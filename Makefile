@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint types unit colcon floors bench docs blind blind-ci lock clean help
+.PHONY: demo test lint types unit colcon floors headers bench docs blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
@@ -64,6 +64,9 @@ colcon: $(FLOORS_READY)  ## colcon build and colcon test of the fast part in tha
 	! $(COLCON_ENV) colcon --log-base $(COLCON)/log test $(COLCON_SPACES) --return-code-on-test-failure \
 		--test-result-base $(COLCON)/failed --pytest-args $(COLCON)/test_fails.py
 	$(COLCON_ENV) colcon test-result --test-result-base $(COLCON)/failed | grep -q "1 test, 0 errors, 1 failure"
+
+headers:  ## Add the SPDX line to source files that lack it
+	$(PYTHON) .ci/headers.py
 
 SPEED := kernel composed control_step reading replay lockstep
 

@@ -120,6 +120,14 @@ def test_the_changelog_is_read_up_to_the_last_release(package: Package) -> None:
     assert all(changelog.get_content_of_version(version) for version in released)
 
 
+def test_every_source_file_begins_with_its_licence() -> None:
+    if not (ROOT / ".git").exists():
+        pytest.skip("which files are the project's is known to git")
+    command = [sys.executable, str(ROOT / ".ci" / "headers.py"), "--check"]
+    found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, f"run `make headers`:\n{found.stdout}{found.stderr}"
+
+
 def floors() -> dict[str, Version]:
     """Pinned oldest versions that hold for this Python."""
     lines = (ROOT / "floors.txt").read_text(encoding="utf-8").splitlines()
