@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Build description: an ament_python package that pip installs as well."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Add the SPDX line to source files that lack it; ``--check`` only lists them (exit code 1 if there are any)."""
 
 from __future__ import annotations

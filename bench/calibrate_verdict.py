@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the verdict's probabilities fare on cases with known answers, and the constants that would have fared best.
 
 Reads a folder of labels (<case>.json with "kind") and one of diagnoses (<case>.json, bare or under "diagnosis"), as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mutated frames by the million: nothing crashes, none with a wrong CRC is taken, Python and C agree on every one.
 
 ``python bench/fuzz_frames.py [--count 1000000] [--seed 1]`` builds the firmware core under the address and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Active pneumatic half-car rig: simulate, drive, log, replay, and diagnose the sim-to-real gap."""
 
 from importlib.metadata import PackageNotFoundError, version

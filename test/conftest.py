@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shared helpers of the tests: where the reference data is, and a clear word when it is not there."""
 
 from __future__ import annotations

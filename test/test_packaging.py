@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What package.xml, setup.py, floors.txt and the changelog promise: dependencies, versions, releases, headers."""
 
 from __future__ import annotations

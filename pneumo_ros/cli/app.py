@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A Typer app that reads its commands' annotations itself, so that Ubuntu 24.04's Typer 0.9 takes them too.
 
 Typer 0.9 reads neither an ``Annotated`` that ``from __future__ import annotations`` left as text nor ``X | None``; the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo blind`: cases whose answer is withheld, made, diagnosed and scored by anyone."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo calibrate`: a calibration from measured points, or what is doubtful about an existing one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo diagnose`: where the gap between log and model lies, which effect makes it, how far it shrinks."""
 
 from __future__ import annotations

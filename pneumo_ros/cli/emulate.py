@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo emulate`: a serial port that behaves like the rig, for trying the hardware path without hardware."""
 
 from __future__ import annotations

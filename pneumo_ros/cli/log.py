@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo log``: look into logs, check them, repair, export and compare them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # ruff: noqa: E402
 """`pneumo`: verbs are imported only when asked for, so that `pneumo --help` is quick."""
 

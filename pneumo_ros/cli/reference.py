@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write what is made from tables: docs/topics.md, docs/parameters.md, config/layouts/ and urdf/.
 
 `make docs` runs it; tests hold the files up to date.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo replay``: a log again - live into ROS, stepped through today's code, or its road through the rig."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo run`: a session from one command: start, watch, summarise, picture."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo thesis`: recompute the thesis's tables, figures and claims."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The text of docs/topics.md around the table: why these types, and which quality of service each kind of topic has."""
 
 from __future__ import annotations

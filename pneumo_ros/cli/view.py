@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo view``: a session in the browser, recorded or running."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Consistent overhead byte stuffing (Cheshire and Baker, 1999) of what fits into a frame of the serial protocol.
 
 Each run of bytes without a zero gets its length + 1 in front and loses the zero behind it, so that 0x00 ends a frame.

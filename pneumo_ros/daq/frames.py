@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Records of the serial protocol, mirroring docs/serial-protocol.md one to one, and their frames.
 
 A frame on the wire is COBS(version, kind, body, CRC-16) followed by 0x00; everything is little-endian.

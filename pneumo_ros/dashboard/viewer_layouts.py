@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layouts of the dashboard's panels for Foxglove and PlotJuggler, made from the same table.
 
 Both plot what is recorded, so signals that the dashboard derives (tyre forces, heave from the LVDTs) are replaced by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finding effects: the package's own, a user's file, or an installed entry point."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a log's rig did as a scene: joint states, transforms and the URDF, for viewers that show a robot in 3D.
 
 Made from any log with /rig/displacement, not recorded live: a session is not slowed by what only viewers want, and logs

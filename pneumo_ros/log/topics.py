@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of topics: every topic of the graph, its type, contents, units, quality of service and who uses it.
 
 The nodes create their publishers and subscriptions from it; docs/topics.md and msg_tests are made from it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every node of a session shares: declared parameters, topics from the table, readiness, health."""
 
 from __future__ import annotations

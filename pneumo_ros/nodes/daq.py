@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The real rig (or an emulated one) on a serial port: a life cycle node over :mod:`pneumo_ros.daq`.
 
 configure: open the port, shake hands, load the calibration; raw counts flow, zero and span work. activate: arm the

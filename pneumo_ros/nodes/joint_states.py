@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint states and the URDF of the running rig, for RViz, robot_state_publisher and PlotJuggler. Not part of a session.
 
 Started beside one: ``ros2 run pneumo_ros joint_states``. With control_msgs installed it also publishes what the

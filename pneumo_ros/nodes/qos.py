@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quality of service of each kind of flow, by REP 2003, for both time modes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car as a mechanism: joints from displacements, and where its frames are.
 
 Frames by REP 103: x forwards, y left, z up; ``ground`` is the root. The body heaves and pitches at its centre of mass,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car as a URDF: masses, arms and inertia of a rig, four joints named as the channels of the logs.
 
 The heights of a joint are those of the model, from the ground datum where the unloaded tyres just touch. What the model

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a session is asked to do, checked before anything starts."""
 
 from __future__ import annotations

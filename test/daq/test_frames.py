@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames and stream of the serial protocol: the shared vectors, damage, and getting back in step."""
 
 from __future__ import annotations

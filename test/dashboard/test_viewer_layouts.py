@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layouts for other viewers are up to date and name what a session really records."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A session's log field by field as rosbag2's MCAP storage reads it (its `ros2 bag` has no wheels to try it with).
 
 The tables below are rosbag2_storage's YAML conversions (metadata version 9) and what its MCAP plugin takes from a file.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo log scene`: joint states, transforms and URDF made from a log."""
 
 from __future__ import annotations

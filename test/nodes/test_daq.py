@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The life cycle node of the hardware over real DDS and a real pseudo-terminal: sessions, trips, services."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bridge to viewers over real DDS: joint states and URDF beside a plant that another node plays."""
 
 from __future__ import annotations

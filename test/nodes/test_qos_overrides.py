@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quality of service by parameter, and parameters dumped from one node and given to another, over real DDS."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plant against the independent check values, and against conservation of mass and energy."""
 
 from __future__ import annotations

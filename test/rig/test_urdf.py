@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The URDF agrees with the rig: it parses, its masses and arms are the rig's, and joints turn the right way."""
 
 from __future__ import annotations

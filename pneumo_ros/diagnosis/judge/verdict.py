@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From scores to a verdict with a probability.
 
 Two questions in turn. Is what the best named structure leaves small enough for a law of the right kind, on the blocks
