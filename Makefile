@@ -7,7 +7,7 @@ READY := $(VENV)/.ready
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 
-.PHONY: demo test lint types unit bench docs blind blind-ci lock clean help
+.PHONY: demo test lint types unit colcon floors headers bench docs blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
@@ -32,6 +32,42 @@ types: $(READY)
 
 unit: $(READY)
 	$(BIN)/python -m pytest
+
+# A second environment with what Ubuntu 24.04 packages, and PyPI's colcon: as near to a sourced Jazzy as wheels come.
+FLOORS := .venv-floors
+FLOORS_READY := $(FLOORS)/.ready
+COLCON := build/colcon
+COLCON_ENV := PATH="$(CURDIR)/$(FLOORS)/bin:$$PATH" NUMBA_CACHE_DIR="$(CURDIR)/build/numba-floors"
+COLCON_SPACES := --base-paths . --packages-select pneumo_ros --build-base $(COLCON)/build --install-base $(COLCON)/install
+# Fast, and what ROS or a library's version can break: messages, codecs, logs, quality of service, kernels, verbs. Not
+# Parquet: ROS has no package of it.
+FAST ?= msg_tests test/plant test/estimation test/nodes/test_qos_overrides.py test/log/test_cdr.py test/log/test_writing.py \
+	test/log/test_rosbag2_schema.py test/log/test_tools.py test/test_launch.py test/test_docs.py test/test_packaging.py
+
+$(FLOORS_READY): floors.txt setup.py package.xml
+	$(PYTHON) -m venv $(FLOORS)
+	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check --constraint floors.txt --editable '.[ros,test]' \
+		colcon-common-extensions
+	$(FLOORS)/bin/python -m pip uninstall --quiet --yes pneumo_ros
+	@touch $@
+
+floors: $(FLOORS_READY)  ## The versions of Ubuntu 24.04 in an environment of their own
+
+colcon: $(FLOORS_READY)  ## colcon build and colcon test of the fast part in that environment, the result counted (2 min)
+	rm -rf $(COLCON)
+	$(COLCON_ENV) colcon --log-base $(COLCON)/log build $(COLCON_SPACES)
+	$(COLCON_ENV) colcon --log-base $(COLCON)/log test $(COLCON_SPACES) --return-code-on-test-failure \
+		--event-handlers console_cohesion+ --pytest-args $(FAST) " -m" "not slow" " -k" "not parquet"
+	$(COLCON_ENV) colcon test-result --test-result-base $(COLCON)/build
+	. $(COLCON)/install/local_setup.sh && cd $(COLCON) && install/pneumo_ros/lib/pneumo_ros/pneumo --version
+	@echo "A test that fails must make colcon test fail and be counted:"
+	echo "def test_fails(): assert False" > $(COLCON)/test_fails.py
+	! $(COLCON_ENV) colcon --log-base $(COLCON)/log test $(COLCON_SPACES) --return-code-on-test-failure \
+		--test-result-base $(COLCON)/failed --pytest-args $(COLCON)/test_fails.py
+	$(COLCON_ENV) colcon test-result --test-result-base $(COLCON)/failed | grep -q "1 test, 0 errors, 1 failure"
+
+headers:  ## Add the SPDX line to source files that lack it
+	$(PYTHON) .ci/headers.py
 
 SPEED := kernel composed control_step reading replay lockstep
 
@@ -60,4 +96,4 @@ lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
 		--no-emit-index-url --no-annotate --no-header --output-file requirements.lock
 
 clean:  ## Remove the virtual environment and what was built
-	rm -rf $(VENV) build *.egg-info bench/build
+	rm -rf $(VENV) $(FLOORS) build *.egg-info bench/build

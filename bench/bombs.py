@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Peak memory of every verb on every bomb of the tests, and on real logs: ``python bench/bombs.py [LOG...]``.
 
 Prints the table of docs/logs.md.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the probabilities of effects fare on cases with known answers, and the constants that would have fared best.
 
 Reads a folder of labels (<case>.json with "truth") and one of diagnoses (<case>.json, bare or under "diagnosis"), as

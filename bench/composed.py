@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time per RK4 step of the composed kernel (whole library, any two effects on) beside plain C, one run, ratios of
 medians.
 """

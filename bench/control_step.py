@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What estimator and controller steps cost, called from Python, beside a plant period: python bench/control_step.py.
 
 Medians of interleaved rounds in one run; the ratios are what compares between machines.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mutated logs and configurations through every reader: ``python bench/fuzz_logs.py --logs 10000 --configs 500``."""
 
 from __future__ import annotations

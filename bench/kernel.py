@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Time per RK4 step of the compiled half car beside the same equations in plain C, one run, ratio of medians."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hostile serial line, counted: ``python bench/line_proxy.py --frames 1000000``.
 
 Driver, board rules and rig on one simulated clock; between them a proxy that drops, duplicates, reorders, delays,

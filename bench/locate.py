@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How well the places of a gap are found, on cases with known places (made by `pneumo blind make`).
 
     python bench/locate.py CASES

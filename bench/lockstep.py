@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much faster than real time a lockstep session runs, as five processes and in one, one run, medians."""
 
 from __future__ import annotations

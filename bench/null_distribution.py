@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What effects that are not there win by: the null distribution behind the thresholds of gap/selection.py.
 
 Each seed draws a rig inside its tolerances, simulates two logs of it (sensor noise, commands that jump between the

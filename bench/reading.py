@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Opening a log of a million messages into arrays, beside the generic reader on the same data: speed, memory."""
 
 from __future__ import annotations

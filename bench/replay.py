@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much faster than real time stepped replay runs at 500 Hz, and how punctual live replay is; one run, medians."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loop over the serial path for as long as you like: lost frames, stamps, and the ride beside the plant's own.
 
 ``python bench/serial_loop.py [--duration 60] [--seed 1] [--calibration appendix_c_corrected]`` starts an emulated rig

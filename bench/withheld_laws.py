@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the library's law leaves of each law that the blind check withholds, fitted to it without noise.
 
     python bench/withheld_laws.py [--only TEXT] [--grade 20]

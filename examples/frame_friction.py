@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Another rig: a base-excited frame whose floor rubs against a wall. What is missing in its published model, and where?
 
     python examples/frame_friction.py DATA_FOLDER

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Another rig: compressed-air chambers, shut after filling. Which of them leaks, and how fast?
 
     python examples/leaking_chamber.py DATA_FOLDER

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Launch a session under a full ROS 2: `ros2 launch pneumo_ros rig.launch.py source:=sim`."""
 
 from __future__ import annotations

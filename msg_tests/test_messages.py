@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of a real session against the table of topics: types, names, units' order of magnitude, frames, docs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names for the arrays that all numerics pass around."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """YAML and JSON that others wrote: bounded in size, depth and entries, and without aliases, before they are built.
 
 A few hundred bytes of YAML aliases stand for 10^9 values, and a text nested a hundred thousand deep ends the process

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the user did wrong, said on one line: what, where, the value, what is allowed, the remedy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that this package makes: whole or not at all, and never through a link that stands in their place."""
 
 from __future__ import annotations

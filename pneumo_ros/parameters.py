@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declared parameters: one entry says all that a node, the command line and the docs need of a value."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the files that ship with the package are: a source checkout, a pip prefix or a colcon install."""
 
 from __future__ import annotations

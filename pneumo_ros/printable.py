@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Texts from elsewhere, as they may be shown: what would steer a terminal or turn a line round is shown, not obeyed."""
 
 from __future__ import annotations

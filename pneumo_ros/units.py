@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conversion factors and physical constants; SI inside, other units only at the edges.
 
 The factors are exact by definition (international inch, pound-force, psi) except where a comment says otherwise.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What README and docs/ tell a user to type exists: verbs, their options, make targets, files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The engine on other rigs: real measurements with a known effect (skipped where the data are not there)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """launch/rig.launch.py names executables, parameters and files that exist.
 
 ROS 2's launch has no wheels: what `ros2 launch` does with the file is not tested here. Its syntax tree is read instead.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names that docstrings and comments refer to exist: roles such as :func:`x`, modules by dotted name, files by path."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the source may not contain: calls that turn a text into code, and shells."""
 
 from __future__ import annotations

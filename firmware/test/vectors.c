@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Runs the shared vectors against the firmware core: vectors FRAMES.txt BEHAVIOUR.txt. Exit code 0 only if all pass. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Reads frames from stdin (u16 little-endian length, then that many bytes, without delimiter), writes one byte each: what
    pneumo_decode() says. For a frame it accepts, encodes the record again and reports 255 if that gives other bytes after decoding. */
 #include <stdio.h>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes frames.txt and behaviour.txt, the vectors that the C and the Python side both have to pass.
 
 Uses the standard library only, with its own COBS and binascii's CRC, so that neither side is checked against itself.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Air of one end: flows through real valves and leaks, energy balance with wall heat.
 
 The contract's closure (Eq. 4.22 with the polytropic temperature) is the limit without heat; with heat the gas has a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every case shares: the nominal rig, its plant, and the ruler by which effects are sized."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The true budget of a case's held-out gap: what each effect makes, what a refit takes, counted like a diagnosis does.
 
 For every subset S of the effects the true rig with only those effects is driven by the log's commands from its first

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Make one case: draw the rig, size the effect to its grade, simulate three logs, write them and the label."""
 
 from __future__ import annotations

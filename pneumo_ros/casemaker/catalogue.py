@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What can be wrong with a rig, as the maker of cases states it: effect ids of the contract with the laws that each may
 follow, and kinds that lie outside every family.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forces between body, axle and ground that the nominal rig does not have: friction, bellows, stop, tyre."""
 
 from __future__ import annotations

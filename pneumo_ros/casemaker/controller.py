@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers that run inside the simulated rig: slow levelling, and an active one with a boundary layer.
 
 Both see the sensors' values, noise and faults included, once a period.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The true law of an effect as a curve over its own coordinate, as the held-out session shows it.
 
 The effect's own part is what the rig's equations give with it less what they give without it, at the very states of the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Right-hand side of the richer rig.
 
 State: 0-9 as :mod:`pneumo_ros.plant.half_car`; then one block of 21 for each end (bristle, bellows memory, bellows

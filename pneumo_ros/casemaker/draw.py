@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is drawn for a case: a rig inside its tolerances, small imperfections of every real rig, three scenes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What shakes the rig: roads of ISO 8608 class C to E at the scale of the rig, sweeps, multisines, and valve steps.
 
 Every road is still for the first half second, so that the first sample of a log is the rig at rest.

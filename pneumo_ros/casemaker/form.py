@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A small smooth error of the model's form: what every real rig has and no effect names.
 
 Mild curvature of the effective area over stroke and pressure, of the flows over pressure and of the tyre over its

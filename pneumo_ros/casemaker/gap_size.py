@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How large a case's gap is: what the nominal model leaves after a refit inside its tolerances, over the null floor.
 
 The same refit of the contract's plant is made on the case and on the same case without its effect. The ratio of what

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of the contract that act on forces: friction, damping, bellows, tyre, stop, mass, exciter."""
 
 from __future__ import annotations

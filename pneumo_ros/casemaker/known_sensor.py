@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects of the contract that act on what the sensors say. A closed loop carries them into the rig as well."""
 
 from __future__ import annotations

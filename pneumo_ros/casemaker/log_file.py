@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write a simulated session as a log of the contract (section 2)."""
 
 from __future__ import annotations

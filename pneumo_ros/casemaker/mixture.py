@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The mix of sets from 0.4 on: second laws, several effects at once, named beside unnamed, errors of form."""
 
 from __future__ import annotations

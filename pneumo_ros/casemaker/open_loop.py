@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The richer rig driven by a log's commands: what a rig with some of the effects would have shown in that log."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """More kinds that lie outside every family: what a diagnosis should locate but not name."""
 
 from __future__ import annotations

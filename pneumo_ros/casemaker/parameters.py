@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parameters of the richer rig: what the nominal rig has, plus every extra, each zero (off) by default.
 
 The names with which a fault is stated live in :mod:`pneumo_ros.casemaker.catalogue`; this module only says what the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which cases a set holds: fixed seeds, fixed mix, in an order that tells nothing."""
 
 from __future__ import annotations

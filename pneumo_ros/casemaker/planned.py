@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One case before it is made, and what every plan of cases keeps to."""
 
 from __future__ import annotations

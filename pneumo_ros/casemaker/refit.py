@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The linear refit with bounds: what a structure leaves once the rig's tolerances have taken their share.
 
 The sensitivities of the contract's plant serve every structure of a case, so that all its subsets of effects cost one

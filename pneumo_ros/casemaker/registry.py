@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The register of what can be wrong with a rig; :mod:`pneumo_ros.casemaker.catalogue` fills it and answers questions.
 
 An effect turns a size in (0, 1] (1 is the largest sane one) into changes of the rig's parameters. The laws are the

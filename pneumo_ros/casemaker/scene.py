@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One session of a case: which road, which controller, which valve excitation, what is known to be changed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Seals: a salted SHA-256 of every label, published before the diagnosis runs and checked when answers are opened."""
 
 from __future__ import annotations

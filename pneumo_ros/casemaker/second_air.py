@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of the contract's effects on the air: valves, leak, supply, heat, volumes, areas."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of the contract's effects on forces: friction, damping, bellows, stop, tyre, masses, exciter."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of the contract's sensor effects: curved scales, moving zeros, throttled gauge lines."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs the richer rig: RK4 at a fixed step, valves and controller in the loop, sensors sampled every period."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How large the effects of a case are: each sized alone to its grade, then seen together."""
 
 from __future__ import annotations

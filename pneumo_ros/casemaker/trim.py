@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The richer rig at rest on flat ground, levelled by what its own sensors say."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kinds that no list of effects contains: what a diagnosis should call unknown rather than by a wrong name."""
 
 from __future__ import annotations

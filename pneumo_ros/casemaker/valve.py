@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inlet valve between command and opening: delay, cross-talk, sticking spool, slew limit, overlap.
 
 The second order lag of the spool is part of the differential equations; what has a memory but no rate is here and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo blind`: cases whose answer is withheld, made, diagnosed and scored by anyone."""
 
 from __future__ import annotations
@@ -11,15 +12,14 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
     from pneumo_ros.casemaker.scoring.results import Found
 
-app = typer.Typer(
-    no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld."
-)
+app = App(no_args_is_help=True, add_completion=False, help="Check the diagnosis on cases whose answer is withheld.")
 
 Folder = Annotated[Path, typer.Argument(help="Folder of the set: manifest.json, cases/, labels.json.")]
 Workers = Annotated[int, typer.Option(help="Local processes.", min=1)]

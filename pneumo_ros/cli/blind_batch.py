@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run many independent pieces of work: over local processes, or over a Dask cluster. Results are files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The two pieces of work of a blind check, as functions of plain values so that any process can run them."""
 
 from __future__ import annotations

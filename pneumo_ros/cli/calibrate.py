@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo calibrate`: a calibration from measured points, or what is doubtful about an existing one."""
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.existing import Overwrite, refuse_existing
 
 if TYPE_CHECKING:
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from pneumo_ros.daq.calibration_fit import Fit
 
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 
 
 @app.command()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Words of the command line that must name something, checked before anything heavy is imported."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo diagnose`: where the gap between log and model lies, which effect makes it, how far it shrinks."""
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import typer
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from pneumo_ros.diagnosis.result import Diagnosis, EditTest
     from pneumo_ros.diagnosis.signals import Signals
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 SHARE_SHOWN = 0.05
 SHOWN = 5  # rows of the ranking on the terminal; the file has all
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo diagnose --tables`: what the Chapter 5 model misses in Tables 5.4 and 5.5."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo effects`: what the diagnosis can name: meaning, places, parameters, what looks alike, the check by hand."""
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pneumo_ros.cli.app import App
+
 if TYPE_CHECKING:
     from rich.console import Console
 
     from pneumo_ros.effects.contract import Effect
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 
 
 @app.command()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo emulate`: a serial port that behaves like the rig, for trying the hardware path without hardware."""
 
 from __future__ import annotations
@@ -7,13 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pneumo_ros.cli.app import App
+
 if TYPE_CHECKING:
     from pneumo_ros.cli.terminal import Console
     from pneumo_ros.parameters import Value
     from pneumo_ros.rig import Rig
     from pneumo_ros.road import Road
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 
 
 @app.command()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is there already is not written over unless the user says so."""
 
 from __future__ import annotations

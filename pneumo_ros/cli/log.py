@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo log``: look into logs, check them, repair, export and compare them."""
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from pneumo_ros.log.repair import Recovery
     from pneumo_ros.log.salvage import Salvaged
 
-app = typer.Typer(
+app = App(
     add_completion=False, help="Look into a session log, check, repair, export and compare.", no_args_is_help=True
 )
 console = Console()
@@ -125,6 +127,21 @@ def compare(
         typer.echo(json.dumps(asdict(result), indent=2, default=str))
     else:
         _show_comparison(result)
+
+
+@app.command()
+def scene(
+    log: LogPath,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Log to write (.mcap).")],
+) -> None:
+    """The rig's motion as joint states, transforms and URDF, for viewers that show a robot in 3D."""
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.log.scene import write_scene
+
+    count = write_scene(read_log(log), output)
+    console.print(
+        f"{output}  {count} instants; layout config/layouts/foxglove_3d.json", highlight=False, soft_wrap=True
+    )
 
 
 @app.command()

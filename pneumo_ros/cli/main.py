@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # ruff: noqa: E402
 """`pneumo`: verbs are imported only when asked for, so that `pneumo --help` is quick."""
 
@@ -26,6 +27,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from pneumo_ros import __version__
+from pneumo_ros.cli.app import App
 from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
@@ -35,7 +37,7 @@ VERBS: dict[str, str] = {
     "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
-    "log": "Look into a session log: info, validate, recover, export, compare, report.",
+    "log": "Look into a session log: info, validate, recover, export, compare, scene, report.",
     "view": "Show a session in the browser: a log played back, or a running session.",
     "emulate": "Open a pseudo-terminal that behaves like the rig, with faults to inject.",
     "calibrate": "Fit a sensor's calibration from points, or check what is in force.",
@@ -90,7 +92,7 @@ class LazyGroup(TyperGroup):
             raise typer.Exit(INTERRUPTED) from None
 
 
-app = typer.Typer(
+app = App(
     cls=LazyGroup,
     no_args_is_help=True,
     add_completion=False,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same road with the valves at trim, on the rig of the log with whatever a diagnosis found in it."""
 
 from __future__ import annotations

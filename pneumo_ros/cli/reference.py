@@ -1,4 +1,5 @@
-"""Write what is made from tables: docs/topics.md, docs/parameters.md and config/layouts/.
+# SPDX-License-Identifier: Apache-2.0
+"""Write what is made from tables: docs/topics.md, docs/parameters.md, config/layouts/ and urdf/.
 
 `make docs` runs it; tests hold the files up to date.
 """
@@ -8,21 +9,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.topics_page import topics_page
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
 from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.sheet import effects_page
-from pneumo_ros.log.topics import topics_table
 from pneumo_ros.parameters import Parameter
+from pneumo_ros.rig import load_rig
+from pneumo_ros.rig.urdf import urdf
 
-TOPICS_HEAD = """# Topics
-
-Made from the table in `pneumo_ros/log/topics.py` by `make docs`. Every stamped message carries in `header.stamp`
-the instant its values hold. `JointState` is used as the stamped, named standard message: its `position` holds the value
-in the unit given here, so that any plotting tool shows it by name. Match values by name, never by position. On
-hardware (`pneumo run --source serial`) the node `daq` takes the place of `plant`: it publishes what the sensors of the
-real rig say under the same names.
-
-"""
 EFFECTS_HEAD = """# Effects
 
 Made from the files of `pneumo_ros/effects/library` by `make docs`: what a diagnosis can name, and how an engineer at
@@ -54,19 +48,20 @@ def documents() -> dict[str, str]:
     page = EFFECTS_HEAD + effects_page(laws_of(load_library()))
     return {
         "effects.md": page,
-        "topics.md": TOPICS_HEAD + topics_table(),
+        "topics.md": topics_page(),
         "parameters.md": PARAMETERS_HEAD + "\n".join(parts),
     }
 
 
 def main() -> None:
-    """Write docs/ and config/layouts/ of this checkout."""
+    """Write docs/, config/layouts/ and urdf/ of this checkout."""
     root = Path(__file__).resolve().parents[2]
     for name, text in documents().items():
         (root / "docs" / name).write_text(text, encoding="utf-8")
     for name, make in LAYOUTS.items():
         (root / "config" / "layouts").mkdir(exist_ok=True)
         (root / "config" / "layouts" / name).write_text(make(), encoding="utf-8")
+    (root / "urdf" / "half_car.urdf").write_text(urdf(load_rig()), encoding="utf-8")
 
 
 if __name__ == "__main__":

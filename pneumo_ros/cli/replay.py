@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo replay``: a log again - live into ROS, stepped through today's code, or its road through the rig."""
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import typer
 from rich import box
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.documents import parse_json
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from pneumo_ros.session.rerun import Rerun
     from pneumo_ros.session.what_if import Row
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 console = Console()
 DIFFERS = 1
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Live replay on a terminal: plays a log to its end, listens to the keyboard, says how punctual it was."""
 
 from __future__ import annotations

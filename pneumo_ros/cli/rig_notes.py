@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a rig file leaves out, said where the file is used."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo run`: a session from one command: start, watch, summarise, picture."""
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.choices import ALIASES, DEFAULT_CONTROLLER, ROAD_CLASSES, check_controller, check_road
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from pneumo_ros.rig import Rig
     from pneumo_ros.session.plan import Tables, Values
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 FAILED = 1
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 MIN_SAMPLES = 10  # fewer make no figures

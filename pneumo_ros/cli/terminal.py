@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terminal: colours are ours, texts may come from a log; a text is shown and never obeyed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo thesis`: recompute the thesis's tables, figures and claims."""
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
     from pneumo_ros.thesis.report import Chapter
 
-app = typer.Typer(add_completion=False)
+app = App(add_completion=False)
 console = Console()
 
 

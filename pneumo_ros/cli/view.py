@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """``pneumo view``: a session in the browser, recorded or running."""
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from typing import Annotated
 
 import typer
 
+from pneumo_ros.cli.app import App
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
-app = typer.Typer(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
+app = App(add_completion=False, help="Show a session in the browser: a log played back, or a running session.")
 console = Console()
 NICE = 10  # drawing for browsers gives way to the nodes that run beside it
 END_PATIENCE = 5.0  # s a dashboard has to close its connections

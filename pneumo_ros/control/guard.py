@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One step of what commands the valves, never a command that is not finite: for a session and its replay alike."""
 
 from __future__ import annotations

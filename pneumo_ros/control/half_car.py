@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car's active controllers: one feedback linearisation core, one law for heave and pitch, variants by flags.
 
 Eqs. 6.58-6.90, corrected by errata 8, 10 and 11. Gains of Section 6.7.5 are in inch-second units, as their names say.

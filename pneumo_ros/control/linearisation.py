@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The feedback linearisation core: from a wanted rate of spring force to valve openings (Eqs. 6.7-6.17, 6.63-6.73).
 
 The thesis inverts the 2 x 2 matrix B of Eq. 6.73. B factors into the body's geometry and one gain a spring, so the same

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop without ROS: plant, sensors, estimator and controller in one compiled run, for tests and ensembles.
 
 Order within a period, as in a session: the plant's state is measured, the estimator and the controller step, and their

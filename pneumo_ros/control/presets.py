@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings that belong together: estimator and controller values of each way to run the half car.
 
 ``default`` is what a session starts with; ``thesis`` is Section 6.7.5 as printed; the last two go beyond it.

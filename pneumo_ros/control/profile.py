@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What commands the valves: a controller, or a profile that is played without looking at the rig."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reference model: a triple pole that leads the output smoothly to its set point (Sections 6.4 and 6.7.2)."""
 
 from __future__ import annotations

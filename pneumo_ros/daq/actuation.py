@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command side: modes, arming, what goes to the valves and what never does. Knows no port and no thread.
 
 A command reaches the board only while ARMED, if it is finite, inside the valves' range, newer than the last one and

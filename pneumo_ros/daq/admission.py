@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether a board may drive this rig: its channel map, its watchdog, its safe state."""
 
 from __future__ import annotations

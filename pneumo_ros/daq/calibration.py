@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Volts to SI and back: the calibration of each sensor and valve, read from config/calibration/*.yaml.
 
 A sensor's value is ``gain * volt + offset`` in its own unit (Appendix C's form), converted to SI by name and shifted by

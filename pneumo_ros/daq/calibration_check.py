@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is doubtful about a calibration: one count against the motion, twins that disagree, ranges that do not fit.
 
 The thesis's Eq. C.1 is the case in point (docs/errata.md 12): at 16 bit over +-10 V one count is 0.032 in, the size

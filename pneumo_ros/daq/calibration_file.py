@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calibrations as YAML: read with every mistake named, written so that the same numbers come back."""
 
 from __future__ import annotations

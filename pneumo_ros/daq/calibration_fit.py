@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A calibration line from measured points, as Appendix C made its own: repeated readings averaged, then regressed."""
 
 from __future__ import annotations

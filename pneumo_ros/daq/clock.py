@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Device clock to host clock: offset and drift from arrivals alone, refined by the round trip of commands.
 
 An arrival is the sample time plus a delay that is never negative: the points (device time, arrival - device time) lie

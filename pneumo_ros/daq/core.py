@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The driver without threads or ports: bytes and time in; commands, measurements and events out.
 
 Everything is decided here, so that every path can be tested step by step; :mod:`pneumo_ros.daq.driver` adds the port.

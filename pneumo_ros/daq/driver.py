@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The driver with its port: a reader thread, a supervising thread, and reopening by itself."""
 
 from __future__ import annotations

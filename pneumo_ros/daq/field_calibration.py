@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Zero and span at run time: what the readings of a resting rig make of a calibration. Knows no port."""
 
 from __future__ import annotations

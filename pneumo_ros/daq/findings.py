@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the monitors have found lately: news are told once, arming waits until nothing was found for a while."""
 
 from __future__ import annotations

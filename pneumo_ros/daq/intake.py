@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Samples of a board to measurements: continuity, host time, SI values, and what the monitors find."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limits table at work: a quantity outside its range for longer than its persistence becomes a finding."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether a sensor can be believed: rail, range, rate, stuck, and displacement against pressure.
 
 A reading that fails is withheld from the first sample on; a channel that keeps failing becomes a finding.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Let this process run before ordinary ones and without pauses of its own: a stalled driver trips, a stalled
 emulator is no board.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reason codes of everything the driver reports; they appear on /rig/events and in the log."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The driver's health in words and figures, for /diagnostics (REP 107) and for people."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """config/safety.yaml as typed values: safe command, timeouts, arming, limits, plausibility."""
 
 from __future__ import annotations

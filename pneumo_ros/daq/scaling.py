@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Counts to volts and back, and the two maps the driver needs ready-made: counts to SI, areas to counts."""
 
 from __future__ import annotations

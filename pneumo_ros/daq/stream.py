@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bytes in, records out: splits a stream at the delimiters, drops what fails a check and counts why."""
 
 from __future__ import annotations

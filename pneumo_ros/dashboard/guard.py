@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Who may talk to the dashboard: every request, the web socket's too, is looked at before anything answers it."""
 
 from __future__ import annotations

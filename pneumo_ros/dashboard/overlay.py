@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Logs laid over each other: measured, nominal, corrected and residual of a diagnosis, or two sessions."""
 
 from __future__ import annotations

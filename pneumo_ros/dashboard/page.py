@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dashboard's page: plots, status, events, and what the viewer may do. One instance a browser tab."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the dashboard shows: panels, lines, units, and the few signals that must be derived."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The newest samples of a running topic."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Serve the dashboard: to this computer alone unless told otherwise, and only to who has the token."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the dashboard's samples come from: a log that is played back, or a running session."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Layouts of the dashboard's panels for Foxglove and PlotJuggler, made from the same table.
 
 Both plot what is recorded, so signals that the dashboard derives (tyre forces, heave from the LVDTs) are replaced by
@@ -63,6 +64,34 @@ def foxglove_layout() -> str:
         "userNodes": {},
         "playbackConfig": {"speed": 1},
         "layout": columns,
+    }
+    return json.dumps(document, indent=2) + "\n"
+
+
+def foxglove_3d_layout() -> str:
+    """A layout for the scenes of ``pneumo log scene``: the rig in 3D above its joints."""
+    scene = {
+        "cameraState": {"perspective": True, "distance": 1.2, "phi": 75, "thetaOffset": 35,
+                        "target": [0, 0, 0], "targetOffset": [0, 0, 0.05], "targetOrientation": [0, 0, 0, 1],
+                        "fovy": 45, "near": 0.01, "far": 100},
+        "followMode": "follow-none",
+        "followTf": "ground",
+        "scene": {},
+        "transforms": {},
+        "topics": {topics.ROBOT_DESCRIPTION.name: {"visible": True}},
+        "layers": {"grid": {"layerId": "foxglove.Grid", "instanceId": "grid", "visible": True, "frameLocked": True,
+                            "label": "Grid", "size": 2, "divisions": 20, "frameId": "ground"}},
+    }  # fmt: skip
+    joints = Panel("joints (m, rad)", tuple(
+        Line(name, topics.JOINT_STATES.name, name, 1.0, colour)
+        for name, colour in zip(topics.JOINT_STATES.names, ("#222222", "#7f7f7f", FRONT, REAR), strict=True)
+    ))  # fmt: skip
+    document = {
+        "configById": {"3D!pneumo": scene, "Plot!pneumo": _foxglove_plot(joints)},
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": {"first": "3D!pneumo", "second": "Plot!pneumo", "direction": "column", "splitPercentage": 70},
     }
     return json.dumps(document, indent=2) + "\n"
 
@@ -146,5 +175,7 @@ def plotjuggler_curve(line: Line) -> str:
     return f"{line.source}/{line.channel}{suffix}"
 
 
-LAYOUTS = {"foxglove.json": foxglove_layout, "plotjuggler.xml": plotjuggler_layout}
+LAYOUTS = {
+    "foxglove.json": foxglove_layout, "foxglove_3d.json": foxglove_3d_layout, "plotjuggler.xml": plotjuggler_layout,
+}  # fmt: skip
 """File name below config/layouts/ -> what makes it."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The diagnosis from end to end: logs in, verdict with places, ranking and held-out gaps out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the diagnosis needs to know of any model: parameters, initial state, effects, and a prediction.
 
 Fitting, selection, ambiguity and verdict use nothing but these protocols, so that another rig (a frame on a shaker, an

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The result of a diagnosis and its file form (contract: diagnosis.json)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The user's own folder for generated code: nobody else can write to it, and a file there is what its name says.
 
 What is executed from here was put here by this package under a name that holds the hash of its content; a file whose

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One compiled kernel for a whole library of plant terms: its source is generated, written to a cache and compiled
 once.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Effects that a rig's configuration names: checked against the library, with their values in its order."""
 
 from __future__ import annotations

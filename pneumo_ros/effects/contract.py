@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an effect is: identity, sites, parameters, and one or more hooks by which it acts.
 
 A file of this folder defines one module-level ``EFFECT``; a user's own file does the same and is loaded by path or by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig as diagnosed, stepped period by period: what sessions, the emulator and the closed loop run.
 
 A step is a block of one row through the same hooks and the same kernel that simulate whole logs, with everything that

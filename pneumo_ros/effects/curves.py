@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The curve of an effect over its own coordinate: force over rate, flow over pressure, opening over command, a step.
 
 A law is a curve, a family's shape beside it another; together they are what was measured. Along a run of the rig the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Exact discrete forms of lags and delays for held and for linearly interpolated signals.
 
 Each takes a block of samples and what the block before it left (None before the first), and gives the filtered block

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an engineer at the rig wants to know of an effect: what it is, what it is mistaken for, the check by hand."""
 
 from __future__ import annotations

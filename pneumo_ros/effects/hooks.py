@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hand-written pieces of the composed kernel: what a plant term sees, and the air balance with a sagging supply.
 
 The nominal equations are those of :mod:`pneumo_ros.plant.half_car`; here their intermediate quantities have names so

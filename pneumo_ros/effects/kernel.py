@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig with the terms of effects, integrated: what :mod:`pneumo_ros.effects.composition` compiles.
 
 Scheme: the ten states of the half car by RK4; a term's own states are staggered by half a step (advanced once per step

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Finding effects: the package's own, a user's file, or an installed entry point.
 
 A file is loaded only because the user named it on the command line. What runs is the copy of it in the user's cache

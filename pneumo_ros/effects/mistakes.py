@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A mistake in a user's effect file as one line: file, line, what, and what there is instead."""
 
 from __future__ import annotations

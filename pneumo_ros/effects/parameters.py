@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an effect is described by, whatever the rig: parameters, what they give together, and an effect at work."""
 
 from __future__ import annotations

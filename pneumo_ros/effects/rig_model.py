@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
 kernel.
 

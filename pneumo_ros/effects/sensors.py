@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hooks that effects of several sensors share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The facts of an effect as words and rows, for the terminal and docs/effects.md."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Any rig to step: what a session, the emulator and the replayed loop start from."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terms of an empty library: the names through which :func:`pneumo_ros.effects.kernel.simulate` calls terms.
 
 Generated modules hold functions of these names for a library. ``z`` is a tuple with each term's own states at each end,

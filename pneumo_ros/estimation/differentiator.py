@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Robust exact differentiator: Levant's homogeneous differentiator with optional filtering, in proper discrete form.
 
 Sources: A. Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control 76 (2003)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car's estimator: rates and accelerations from displacements, effective areas by least squares.
 
 Eqs. 6.91-6.93 with what the rig has besides: gauge pressure makes force (errata 7) and bushing damping acts between

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Estimating parameters a of Y = W a + Psi from prediction errors (Eqs. 6.44-6.51; errata 9: rates).
 
 One recursion serves all of Section 6.6.1; they differ in the forgetting factor lambda_f, 1/s:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The files of a log: one MCAP file, or a folder as ``ros2 bag record`` writes it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How much a log may ask for: a file of a few kilobytes can state, or unpack to, more than the computer has.
 
 The limits lie far above what recorders write (chunks of 64 KiB to 4 MiB, some ten topics) and far below a computer's

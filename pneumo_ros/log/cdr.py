@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fixed-layout CDR of the two messages of the control loop, without a generic converter.
 
 JointState and FluidPressure make up nearly all of the traffic. Converting a JointState through rclpy's Python objects

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An MCAP writer for many small messages: the library's records, its own loop.
 
 mcap's Writer spends 3.4 us on a message, most of it in single-field writes; in a thread that shares the interpreter

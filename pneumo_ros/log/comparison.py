@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two logs side by side: what was recorded, with which rig and parameters, and how far the signals differ."""
 
 from __future__ import annotations

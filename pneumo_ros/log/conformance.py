@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Does a log keep the contract? One finding a line: what was looked at, whether it holds, and why not."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The MCAP container: records with every bound and checksum checked, nothing decoded.
 
 Framing and bounds are done here because the reader must tell *where* a damaged file breaks and must never take a short

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The generic way of decoding: message by message, for those that no fixed layout fits. Same paths, same values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a log holds and how regular it is: rates, gaps, jitter, clock jumps, delays, and what explains the run."""
 
 from __future__ import annotations

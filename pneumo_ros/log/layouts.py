@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the fields of a serialised message lie, so that thousands are decoded by one array view.
 
 Messages of a sensor topic differ in their numbers only: frame id, channel names and array lengths stay. So the layout

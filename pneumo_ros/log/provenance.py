@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a log should say about the software that made it."""
 
 from __future__ import annotations

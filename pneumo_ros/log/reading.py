@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reading a session log into arrays: by topic and by channel name, whoever wrote it.
 
     log = read_log("run.mcap")

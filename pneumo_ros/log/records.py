@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Messages of a channel in bulk: found in a block, gathered into arrays, still undecoded.
 
 A log of a million messages is read in about a second because nothing is done per message: the record offsets come from

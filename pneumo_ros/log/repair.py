@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Make a readable file of a damaged log. The original is only read."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write a log that is in memory to an MCAP file: repaired logs, replayed outputs."""
 
 from __future__ import annotations

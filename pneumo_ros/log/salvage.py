@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reading a damaged log: every chunk whose checksum holds, and an account of what is lost.
 
 Nothing doubtful is kept: a chunk that fails its CRC is left out whole. After a broken record the scan goes on at the

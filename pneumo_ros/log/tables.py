@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Topics as tables, one row a message, for pandas and spreadsheets: CSV or Parquet."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of topics: every topic of the graph, its type, contents, units, quality of service and who uses it.
 
 The nodes create their publishers and subscriptions from it; docs/topics.md and msg_tests are made from it.
@@ -157,9 +158,18 @@ CALIBRATION = Topic(
     flow=Flow.EVENTS,
 )  # fmt: skip
 
+JOINT_STATES = Topic(
+    "/joint_states", JOINT, "joints of the URDF, for viewers (node joint_states beside a session, or pneumo log scene)",
+    "joint_states", frame_id="ground", recorded=False,
+    fields=(("heave", "m"), ("pitch_nose_up", "rad"), ("unsprung_front", "m"), ("unsprung_rear", "m")),
+)  # fmt: skip
+ROBOT_DESCRIPTION = Topic(
+    "/robot_description", STRING, "URDF of the rig, for viewers", "joint_states", flow=Flow.LATCHED, recorded=False,
+)  # fmt: skip
+
 TOPICS: tuple[Topic, ...] = (
     ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
-    EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, APPLIED, CALIBRATION,
+    EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, APPLIED, CALIBRATION, JOINT_STATES, ROBOT_DESCRIPTION,
 )  # fmt: skip
 MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
 BY_NAME = {topic.name: topic for topic in TOPICS}

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write a session log: raw CDR to MCAP in a thread of its own, complete or visibly not.
 
 A zstd chunk takes milliseconds to compress (10 ms at 768 KiB), so nothing of it may happen in a callback. The file

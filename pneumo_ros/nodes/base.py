@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every node of a session shares: declared parameters, topics from the table, readiness, health."""
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
@@ -29,7 +31,7 @@ from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
 from pneumo_ros.nodes.interfaces import message_class
-from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
+from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR
 from pneumo_ros.session.timing import LoopTiming
@@ -157,6 +159,22 @@ class RigNode(Node):
 
     # -- topics ----------------------------------------------------------------------------------------------------
 
+    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
+        """As rclpy's; the quality of service can be overridden by parameters."""
+        if not hasattr(self, "lockstep"):  # rclpy's own, while the node is being made
+            return super().create_publisher(*args, **options)
+        options.setdefault("qos_overriding_options", overriding(self.lockstep))
+        with refused_overrides(self.get_name(), args[1]):
+            return super().create_publisher(*args, **options)
+
+    def create_subscription(self, *args: Any, **options: Any) -> Subscription:
+        """As rclpy's; the quality of service can be overridden by parameters."""
+        if not hasattr(self, "lockstep"):
+            return super().create_subscription(*args, **options)
+        options.setdefault("qos_overriding_options", overriding(self.lockstep))
+        with refused_overrides(self.get_name(), args[1]):
+            return super().create_subscription(*args, **options)
+
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the table."""
         made = self.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic.flow, self.lockstep))
@@ -199,6 +217,12 @@ class RigNode(Node):
 
     # -- health ----------------------------------------------------------------------------------------------------
 
+    @property
+    def hardware_id(self) -> str:
+        """Which rig a status is about (REP 107): the rig's name, where a node knows no closer one."""
+        rig = getattr(self, "rig", None)
+        return str(rig.name) if rig is not None else str(self.values["rig"]) or "half-car-rig"
+
     def timed(self, start_ns: int) -> None:
         """Account for one step that began at ``start_ns`` (monotonic) and ends now."""
         self.timing.mark(start_ns, time.monotonic_ns())
@@ -227,7 +251,7 @@ class RigNode(Node):
         self._events.publish(self._array(level, self.get_name(), message, {"code": code, **(values or {})}))
 
     def _array(self, level: bytes, name: str, message: str, values: Mapping[str, str]) -> DiagnosticArray:
-        status = DiagnosticStatus(level=level, name=name, message=message, hardware_id="half-car-rig")
+        status = DiagnosticStatus(level=level, name=name, message=message, hardware_id=self.hardware_id)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         out = DiagnosticArray(status=[status])
         out.header.stamp = self.get_clock().now().to_msg()

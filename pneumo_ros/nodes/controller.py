@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Command the valves from the estimate; never a value that is not finite, never outside the valve's range."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The real rig (or an emulated one) on a serial port: a life cycle node over :mod:`pneumo_ros.daq`.
 
 configure: open the port, shake hands, load the calibration; raw counts flow, zero and span work. activate: arm the
@@ -82,6 +83,13 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.reason = ""
         LifecycleNodeMixin.__init__(self)
         self.course = SessionCourse(self)
+
+    @property
+    def hardware_id(self) -> str:
+        """The board's serial number once it has answered: which hardware a status is about (REP 107)."""
+        driver = getattr(self, "driver", None)
+        intake = driver.core.intake if driver is not None else None
+        return intake.hello.serial_number if intake is not None else super().hardware_id
 
     @property
     def state_label(self) -> str:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the driver measures and applies as messages: the plant's topics, raw counts, supply pressure, openings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an operator asks of the hardware: emergency stop, reset, zero, span."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The course of a session on hardware: start when everybody is ready, deactivate on a trip, end after its duration."""
 
 from __future__ import annotations

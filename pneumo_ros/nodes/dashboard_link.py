@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the dashboard hears of a running session, and what it may ask of it. The session never waits for it."""
 
 from __future__ import annotations

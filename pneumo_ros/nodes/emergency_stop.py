@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Latched emergency stop of the node that owns the valves: a topic and a service set it, only a service releases it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Estimate motion and effective areas from the six measurements of each sample."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Message classes by interface name; the PyPI wheels have no rosidl_runtime_py that would do it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The simulated rig. In lockstep it owns /clock and advances a period once command and road for it are in."""
 
 from __future__ import annotations

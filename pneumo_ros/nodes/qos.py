@@ -1,8 +1,14 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quality of service of each kind of flow, by REP 2003, for both time modes."""
 
 from __future__ import annotations
 
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
@@ -11,6 +17,50 @@ from pneumo_ros.log.topics import BY_NAME, Flow
 RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
 
 _DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10}
+
+
+OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+
+
+def overriding(lockstep: bool) -> QoSOverridingOptions:
+    """Lets parameters ``qos_overrides.<topic>.<publisher or subscription>.<policy>`` replace what the table says.
+
+    Not everything: in lockstep a lost sample would stop the session for ever, and a queue of nothing delivers nothing.
+    """
+
+    def judged(profile: QoSProfile) -> SetParametersResult:
+        reason = ""
+        if lockstep and profile.reliability is ReliabilityPolicy.BEST_EFFORT:
+            reason = "in lockstep every message counts: reliability must be reliable"
+        if profile.history is HistoryPolicy.KEEP_LAST and profile.depth < 1:
+            reason = f"depth is {profile.depth}, 1 or more is allowed"
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    return QoSOverridingOptions(OVERRIDABLE, callback=judged)
+
+
+@contextmanager
+def refused_overrides(node: str, topic: str) -> Iterator[None]:
+    """What rclpy says of a bad override, as the mistake of a user that it is.
+
+    Raises
+    ------
+    InputError
+        instead of rclpy's own kinds of error.
+    """
+    try:
+        yield
+    except (InvalidQosOverridesError, RuntimeError) as error:
+        if "QoS override" not in str(error):
+            raise
+        raise InputError(
+            f"refused ({error})",
+            where=node,
+            key=f"qos_overrides.{topic}",
+            allowed="history keep_last or keep_all; depth 1 or more; reliability reliable, or best_effort but not in "
+            "lockstep; durability volatile or transient_local",
+            remedy="correct or remove the override",
+        ) from error
 
 
 def publisher_qos(flow: Flow, lockstep: bool) -> QoSProfile:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publish a log again, live: its inputs as they were recorded, with /clock, for nodes that run beside it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Publish the road under both axles ahead of the clock, so that a period's end is known when it starts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Record every topic of the session as it was sent: raw CDR, written by a thread of its own."""
 
 from __future__ import annotations

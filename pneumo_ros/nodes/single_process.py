@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All nodes of a simulated session in one process and one executor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run nodes until they finish or a signal asks to stop; errors end with one line and an exit code."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Firestone 2M2A air spring: effective area surface, volume, gas.
 
 Effective area: Table 5.2 continued to 100 psig with Table 4.1's trend; volume: least squares of Table 4.1 (errata 6);

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car on two air springs (Eqs. 4.63-4.72, corrected by errata 1, 7, 8) and its compiled integrator.
 
 State (10), :data:`~pneumo_ros.rig.channels.STATE_FIELDS`: heave, pitch, unsprung front, unsprung rear [m, rad, m, m],

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mass flow of air through an orifice, polytropic, clamped at the critical ratio, with a check valve.
 
 Source: Eqs. 4.1-4.7 (SI form, errata 5) with the critical clamp; Eqs. 4.8 and 4.12 in the corrected form of errata 4.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the rig's sensors read and what a simulation knows beyond them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A rig that can be stepped: what the plant node, the emulator and the replayed loop need to know of one.
 
 Parameters are inside the object, the state is outside: ``init -> state``, ``step(state, command, road) -> state``. The

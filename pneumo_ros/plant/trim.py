@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Static equilibrium: the pressures that carry the body at design height and the inlet openings that hold them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the ride is judged: accelerations, personal ratings, tyre load and workspace.
 
 The scaled rig has a time scale of 1 and a length scale of 5, so its accelerations times 5 are the full-scale car's.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig: its parameters with tolerances, read from YAML, and the names of its channels and state columns."""
 
 from pneumo_ros.rig.limits import END_LIMITS, LIMITS, Limit

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is measured, commanded, estimated and simulated: the names, their columns, and where a point of the body is.
 
 All displacements are upwards from the ground datum; pitch is positive nose up.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What each parameter of the rig means, its unit and its allowed range."""
 
 from __future__ import annotations

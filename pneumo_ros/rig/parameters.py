@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig's parameters: typed, in SI, each with the tolerance its maker states.
 
 Nothing else in the package holds a number of the rig.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig from YAML: config/rig.yaml is the nominal one, a session log carries its own under ``/rig/config``."""
 
 from __future__ import annotations

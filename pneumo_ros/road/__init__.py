@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What excites the rig: road profiles and valve openings over time."""
 
 from pneumo_ros.road.profiles import (

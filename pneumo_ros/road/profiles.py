@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What excites the rig: road profiles under both axles, frozen and repeatable.
 
 Heights are the road's under the scaled rig, m, upwards; a full-scale road at full-scale speed is divided by the length

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Valve openings over time, read from a file: what is played instead of what a controller would command.
 
 A CSV with a header that names columns and units, for example::

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same road with the valves held at trim, simulated without ROS: what the active session is held against."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One picture of a session: road and heave, pitch, tyre forces, orifice areas, effective areas true and estimated."""
 
 from __future__ import annotations

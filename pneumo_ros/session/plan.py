@@ -1,8 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a session is asked to do, checked before anything starts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,9 @@ from pneumo_ros.parameters import Parameter, Value
 
 Tables = Mapping[str, tuple[Parameter, ...]]
 Values = dict[str, dict[str, Value]]
+# Parameters that rclpy declares in every node; `ros2 param dump` writes them too. rclpy checks them.
+ROS_OWN = ("use_sim_time", "start_type_description_service")
+OVERRIDES = "qos_overrides."
 
 
 def read_config(path: Path, tables: Tables) -> Values:
@@ -31,15 +35,30 @@ def read_config(path: Path, tables: Tables) -> Values:
         if not isinstance(own, Mapping):
             raise InputError("needs a mapping ros__parameters", where=path, key=str(node), value=entry,
                              remedy=f"write {node}: {{ros__parameters: {{...}}}}")  # fmt: skip
-        for key, value in own.items():
+        for key, value in _flat(own):
             assign(out, tables, str(node).lstrip("/") or "**", str(key), value, path)
     return out
+
+
+def _flat(own: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Names and values; what is nested for quality of service gets names with dots, as ROS itself reads it."""
+    for key, value in own.items():
+        if f"{key}.".startswith(OVERRIDES) and isinstance(value, Mapping):
+            yield from _flat({f"{key}.{inner}": one for inner, one in value.items()})
+        else:
+            yield str(key), value
 
 
 def assign(out: Values, tables: Tables, node: str, key: str, raw: object, where: object) -> None:
     """Check one value and put it into ``out``; node ``**`` means every node that knows the key."""
     if node != "**" and node not in tables:
         raise InputError("unknown node", where=where, key=node, allowed=", ".join(tables), remedy="correct the name")
+    if key in ROS_OWN or key.startswith(OVERRIDES):
+        if not isinstance(raw, (bool, int, float, str)):
+            raise InputError("not a single value", where=where, key=f"{node}.{key}", value=raw, remedy="correct it")
+        for target in [node] if node != "**" else tables:
+            out[target][key] = raw
+        return
     targets = [node] if node != "**" else [n for n, t in tables.items() if any(p.name == key for p in t)]
     for target in targets or ["**"]:
         spec = next((p for p in tables.get(target, ()) if p.name == key), None)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stepped replay: recorded measurements through today's estimator and controller, compared with the recorded outputs.
 
 Lossless and deterministic: every sample that the running node took is stepped once, in order, as fast as the machine

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The recorded road through the rig's model, in closed loop with today's estimator and controller: the plant reacts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Estimator and controller as a session runs them, without ROS: one input in, one message out, state explicit.
 
 The nodes and stepped replay take the same :func:`advance`: a replayed session gives the recorded bytes again because

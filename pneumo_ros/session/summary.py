@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a session's log says about the ride, the valves, the estimates and the loop."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the processes of a session, watch them, and end them in an order that loses nothing. Knows no ROS."""
 
 from __future__ import annotations

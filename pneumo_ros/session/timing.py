@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Loop timing: period and execution time as percentiles, missed deadlines counted. Knows no clock."""
 
 from __future__ import annotations

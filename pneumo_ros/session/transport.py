@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where playback is: position in the log as a function of the wall clock; play, pause, rate, seek, step, loop. Pure."""
 
 from __future__ import annotations

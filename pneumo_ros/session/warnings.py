@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a reader of a session's figures must know: periods missed, estimates too late, commands refused."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What other gains would have commanded on the recorded measurements: a table and an overlay plot."""
 
 from __future__ import annotations

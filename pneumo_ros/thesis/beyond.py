@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Beyond the thesis: dA/dt fed forward and both valves commanded, against the thesis's controller; and the limit."""
 
 from __future__ import annotations

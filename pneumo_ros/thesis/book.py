@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All chapters in order, and how many experiments each announces."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 2: comfort criteria and baselines; passive, skyhook and active rides judged side by side."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 3: Pi-numbers by linear algebra, the scaling laws, and the Honda Civic brought to the rig's size."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 4: the pneumatic cars and their similitude; what the laws ask of gravity and the atmosphere."""
 
 from __future__ import annotations

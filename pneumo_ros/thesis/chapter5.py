@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 5: the air spring's static tables and its frequency responses, simulated beside the printed ones."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Chapter 6: roads, the quarter car's controllers and estimators, the half car."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Section 6.7: the half car under first order SMFLC with estimator, exact as in the thesis and with real sensors."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sections 6.3 to 6.6: controllers and estimators on the quarter car, as claims and sensitivity curves."""
 
 from __future__ import annotations

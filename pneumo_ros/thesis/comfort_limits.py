@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ride comfort by frequency: ISO 2631 (1972 limits and today's Wk), Janeway's limits, Healey's table.
 
 All take a full-scale vertical acceleration, m/s2. Sources: Section 2.2; ISO 2631-1974 for the 1972 limits' values;

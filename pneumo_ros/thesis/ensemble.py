@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Many runs on all cores: one picklable job each, results in order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where each numbered equation of the thesis is used: read from the docstrings, so it cannot go stale."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half-car experiments of Section 6.7 and beyond: one run by name, and how its ride is judged."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quarter car's closed loop linearised about rest: whether a controller can ride well at all, before any road."""
 
 from __future__ import annotations

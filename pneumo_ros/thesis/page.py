@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The HTML page and the Markdown table of claims, from chapters as plain data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quarter-car experiments of Sections 6.3 to 6.6, by name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables and pictures of the quarter car."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a chapter hands to the page: claims, tables and figures, as plain data."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Do the quarter car's orderings depend on what the thesis leaves out? Each is tried with every open number changed."""
 
 from __future__ import annotations

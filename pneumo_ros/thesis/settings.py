@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the thesis leaves out, read from config/thesis.yaml: one flat table, checked like every other parameter."""
 
 from __future__ import annotations

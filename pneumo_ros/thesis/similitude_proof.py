@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Similitude tried out: full scale, rig and Pi-numbers simulated side by side, with all laws kept or one broken."""
 
 from __future__ import annotations

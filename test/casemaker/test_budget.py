@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The true budget of a case: adds up, gives to each what it makes; curves are those of the law that acts."""
 
 from __future__ import annotations

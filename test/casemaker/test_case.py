@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cases: sized to their grade, the same for the same seed, written as the contract's log says."""
 
 from __future__ import annotations

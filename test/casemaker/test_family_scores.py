@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scores of set 0.4 on verdicts whose scores are known by hand; the mix of the set itself."""
 
 from __future__ import annotations

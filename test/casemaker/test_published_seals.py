@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The answers that were published after each full set are those that were sealed before it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The richer rig: its nominal limit is the contract's plant; its own laws behave as physics says."""
 
 from __future__ import annotations

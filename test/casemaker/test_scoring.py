@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Seals, intervals and scores of a blind check, on verdicts whose scores are known by hand."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws: at rest, in their own place, of the form that their equations say, and contained in no other one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo blind` at the command line: seals grow, scores are written, a changed verdict fails, mistakes are told."""
 
 from __future__ import annotations

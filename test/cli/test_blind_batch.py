@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Batches of the blind check survive killed workers, locally and on a real Dask cluster; finished cases are kept."""
 
 from __future__ import annotations

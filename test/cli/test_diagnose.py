@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`pneumo diagnose` as a user types it: an effect of one's own, a known change, installed effects, bad input."""
 
 from __future__ import annotations

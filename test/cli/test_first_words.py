@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a wrong word costs and says: one line, the whole list, the nearest name, and nothing heavy imported for it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nothing is written over, assumed or left standing in silence; Ctrl-C says one true thing."""
 
 from __future__ import annotations

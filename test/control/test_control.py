@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers: the laws, the core against the plant, and the closed loop's figures."""
 
 from __future__ import annotations

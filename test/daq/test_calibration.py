@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calibration: Appendix C to the digit, scaling both ways, fits from points, refusals, zero and span."""
 
 from __future__ import annotations

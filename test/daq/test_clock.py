@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Device clock to host time: accuracy under drift, stalls, wrap-around and silence."""
 
 from __future__ import annotations

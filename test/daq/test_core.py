@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The driver's decisions, step by step in simulated time: core, board rules and plant, no port and no thread."""
 
 from __future__ import annotations

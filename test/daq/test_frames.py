@@ -1,8 +1,8 @@
+# SPDX-License-Identifier: Apache-2.0
 """Frames and stream of the serial protocol: the shared vectors, damage, and getting back in step."""
 
 from __future__ import annotations
 
-import binascii
 import random
 import subprocess
 from pathlib import Path
@@ -13,6 +13,7 @@ from helpers.folders import FIRMWARE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pneumo_ros.daq import cobs as ours
 from pneumo_ros.daq import frames
 from pneumo_ros.daq.emulator.device import Device
 from pneumo_ros.daq.frames import Command, CommandFlag, FrameError, Kind, Record, Reject, Sample, decode, encode
@@ -135,6 +136,48 @@ def test_round_trip_of_any_sample(sample: Sample) -> None:
     assert decode(wire[:-1]) == sample
 
 
+@settings(max_examples=500, deadline=None)
+@given(st.lists(st.one_of(st.just(0), st.integers(0, 255)), max_size=ours.LONGEST).map(bytes))
+def test_stuffing_is_that_of_the_cobs_library(data: bytes) -> None:
+    assert ours.stuffed(data) == cobs.encode(data)
+    assert ours.unstuffed(ours.stuffed(data)) == data
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.binary(max_size=frames.MAX_FRAME))
+def test_what_the_cobs_library_refuses_is_refused(frame: bytes) -> None:
+    try:
+        wanted: bytes | None = cobs.decode(frame)
+    except cobs.DecodeError:
+        wanted = None
+    try:
+        found: bytes | None = ours.unstuffed(frame)
+    except ValueError:
+        found = None
+    assert found == wanted
+
+
+def test_data_of_a_full_run_is_refused() -> None:
+    with pytest.raises(ValueError, match="254 bytes to stuff, 253 are allowed"):
+        ours.stuffed(b"\x01" * 254)
+    with pytest.raises(ValueError, match="too long"):
+        ours.unstuffed(cobs.encode(b"\x01" * 254))
+
+
+def crc16(payload: bytes) -> int:
+    """CRC-16/IBM-3740 by its definition, a bit at a time: polynomial 0x1021, all ones at the start."""
+    crc = 0xFFFF
+    for byte in payload:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+def test_the_checksum_has_the_catalogue_s_check_value() -> None:
+    assert frames.checksum(b"123456789") == crc16(b"123456789") == 0x29B1
+
+
 def accepts_rightly(frame: bytes) -> bool:
     """Whether ``decode`` takes the frame; fails if it takes one whose CRC is wrong by an independent computation."""
     try:
@@ -142,7 +185,7 @@ def accepts_rightly(frame: bytes) -> bool:
     except FrameError:
         return False
     data = cobs.decode(frame)
-    assert binascii.crc_hqx(data[:-2], 0xFFFF) == int.from_bytes(data[-2:], "little")
+    assert crc16(data[:-2]) == int.from_bytes(data[-2:], "little")
     return True
 
 

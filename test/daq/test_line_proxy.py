@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A hostile line between driver and board: nothing false is published, nothing old moves a valve."""
 
 from __future__ import annotations

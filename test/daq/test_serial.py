@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The whole serial path on a real pseudo-terminal: an emulated board in its own process, the driver, the control loop.
 
 Reaction times are taken from the board's own record. A stall of this computer may delay a reaction but not excuse it:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dashboard in a real browser: loads offline, moves, stops the rig, outlives the session; and who may see it."""
 
 from __future__ import annotations

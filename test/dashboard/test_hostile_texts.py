@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two hundred texts that would be markup, commands or formulas, in every place of a log, through every way out."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs laid over each other: a diagnosis's residual log, two sessions; a log of something else says what it has."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layouts for other viewers are up to date and name what a session really records."""
 
 from __future__ import annotations
@@ -33,6 +34,15 @@ def test_foxglove_paths_point_at_the_named_channel() -> None:
             found = re.fullmatch(r"(/[\w/]+)\.(\w+)(?:\[(\d+)\])?", path["value"])
             assert found is not None and found[1] == topic.name and topic.recorded
             assert (topic.names[int(found[3])] if found[3] else found[2]) == line.channel
+
+
+def test_the_3d_layout_shows_the_description_and_its_joints() -> None:
+    layout = json.loads(LAYOUTS["foxglove_3d.json"]())
+    assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+    shown = layout["configById"]["3D!pneumo"]
+    assert shown["topics"] == {topics.ROBOT_DESCRIPTION.name: {"visible": True}} and shown["followTf"] == "ground"
+    paths = [path["value"] for path in layout["configById"]["Plot!pneumo"]["paths"]]
+    assert paths == [f"/joint_states.position[{i}]" for i in range(4)]
 
 
 def test_plotjuggler_curves_name_recorded_channels() -> None:

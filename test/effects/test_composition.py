@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The composed kernel integrates the half car's own equations, and its generated text computes nothing."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A rig with effects, stepped: the numbers of the whole-log simulation, for every effect; and its file form."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every effect says what it is, what it is mistaken for and how to check it by hand; a mistaken file says where."""
 
 from __future__ import annotations

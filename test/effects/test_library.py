@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every effect: nothing at zero size, the right sign and energy, and the kernel that composes them."""
 
 from __future__ import annotations

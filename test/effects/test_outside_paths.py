@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Nothing that a log says is imported, opened or written: effects come only from files that the user names."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Differentiator and least squares: exactness, robustness to noise, and that no gain can blow them up."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """What several tests share: small logs, simulated and serial rigs, sessions of their own domain, a browser."""

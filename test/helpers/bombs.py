@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small files that ask for a lot of memory or time, each made in milliseconds; and what a command makes of them."""
 
 from __future__ import annotations

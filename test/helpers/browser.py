@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A headless Chromium that can reach this computer only, and reads Bokeh's page."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A log of any small plant: what it put out and what drove it."""
 
 from __future__ import annotations

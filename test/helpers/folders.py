@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the parts of the repository are that tests read."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mutations of logs and configurations that know their structure, and everything that reads them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a log from elsewhere may carry: effects that would run, texts that would be taken for something else."""
 
 from __future__ import annotations

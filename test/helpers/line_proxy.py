@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A proxy on the serial line that does its worst, and a witness who knows what both ends really said."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulated logs for the tests of the diagnosis: the nominal rig, driven over a road with its valves moving."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An emulated rig in its own process, a driver on its port, estimator and controller at 500 Hz: a loop without ROS."""
 
 from __future__ import annotations

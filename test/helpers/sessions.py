@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run real sessions in tests, each in a DDS domain of its own."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Driver core, board rules and emulated rig on one simulated clock: no port, no thread, no waiting."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Logs of a few messages as any MCAP writer makes them, and what other readers say of a log."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small files that ask for gigabytes or for ever: refused on one line, in little memory, and quickly."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fixed-layout codecs against rclpy's own serialisation."""
 
 from __future__ import annotations

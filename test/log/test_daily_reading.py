@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a person reads of logs day by day: info and compare at 80 and 120 columns, merged tables, a replay of valves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A disk that says no: whatever was recorded until then is read back, and the log says why it ends."""
 
 from __future__ import annotations

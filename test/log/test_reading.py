@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bulk reader agrees with independent readers, value by value, and refuses what is damaged."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damage anywhere: the strict reader refuses or reads the truth, the salvage keeps only the truth."""
 
 from __future__ import annotations

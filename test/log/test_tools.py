@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """info, validate, recover, export and compare find what is planted in a log, and say so."""
 
 from __future__ import annotations
@@ -199,7 +200,7 @@ def test_tables_read_back_to_the_same_numbers(tmp_path: Path, kind: str) -> None
     paths = export(log, tmp_path / "out", kind)
     assert {p.name for p in paths} >= {f"rig_displacement.{kind}", f"rig_config.{kind}"}
     path = tmp_path / "out" / f"rig_displacement.{kind}"
-    frame = pd.read_csv(path, engine="python") if kind == "csv" else pd.read_parquet(path)
+    frame = pd.read_csv(path, float_precision="round_trip") if kind == "csv" else pd.read_parquet(path)
     joint_state = log.joint("/rig/displacement")
     assert list(frame.columns) == ["log_time_ns", "stamp_ns", *NAMES]
     assert np.array_equal(frame[list(NAMES)].to_numpy(), joint_state.position)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The log writer: what the mcap library reads of it, and what happens when the disk says no."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The life cycle node of the hardware over real DDS and a real pseudo-terminal: sessions, trips, services."""
 
 from __future__ import annotations
@@ -122,6 +123,8 @@ def test_a_session_on_hardware_is_logged_like_a_simulated_one(tmp_path: Path) ->
     keys = {v.key for v in health[-1].values}
     wanted = {"frame rate (Hz)", "CRC errors", "lost frames", "latency p99 (us)", "clock drift (ppm)"}
     assert wanted | {"samples at a rail"} <= keys
+    board = next(v.value for v in health[-1].values if v.key == "board")
+    assert health[-1].hardware_id == board != ""
     setups = [yaml.safe_load(text) for text in log.texts("/rig/setup")]
     assert any(s["node"] == "daq" and s["parameters"]["calibration"] == CALIBRATION for s in setups)
 

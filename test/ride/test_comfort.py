@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comfort criteria against their published values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One list of channels, columns that mean what they say, one formula of a point on the body."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the maker holds the model form to be worth travels with the rig, and is zero where nobody states it."""
 
 from __future__ import annotations

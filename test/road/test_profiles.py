@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Roads: their spectrum against Eq. 6.1, their delay, their start, their repeatability."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A valve profile: read with one-line errors, looked up by time, played by a session and replayed byte by byte."""
 
 from __future__ import annotations

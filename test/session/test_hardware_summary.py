@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A session without truth is judged from its sensors, says so, and warns of what a reader must know."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bad input is one line that names what, where, value, allowed range and remedy, with exit code 2; nothing starts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Replay gives the recorded bytes again, says what other gains would have done, and plays live in step."""
 
 from __future__ import annotations

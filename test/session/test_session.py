@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whole sessions over real DDS: complete, repeatable, readable, and honest when something dies."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The session's page says what happened, stands alone, and shows trips first."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Deadlines never drift, missed ones are counted; timing figures are percentiles of what was marked."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The thesis's own tables as data: which law closes which gap on payloads nothing was fitted to."""
 
 from __future__ import annotations

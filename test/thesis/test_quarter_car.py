@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quarter car against the half car it is a corner of, and at rest."""
 
 from __future__ import annotations

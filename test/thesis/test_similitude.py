@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Similitude: Pi-numbers by linear algebra, and the proof that equal numbers make one car of two."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The thesis recomputed: figures that matter, and that every claim gets its verdict."""
 
 from __future__ import annotations

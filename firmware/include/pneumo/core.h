@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The device's behaviour: arming, command watchdog, safe state, e-stop (docs/serial-protocol.md, "What the device does"). */
 #ifndef PNEUMO_CORE_H
 #define PNEUMO_CORE_H

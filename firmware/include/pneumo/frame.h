@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Frames of the serial protocol: docs/serial-protocol.md, record by record. Portable C99, no allocation, no I/O. */
 #ifndef PNEUMO_FRAME_H
 #define PNEUMO_FRAME_H

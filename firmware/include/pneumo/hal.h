@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What a board must provide. Everything hardware-specific is behind these five calls; the core above is plain C99. */
 #ifndef PNEUMO_HAL_H
 #define PNEUMO_HAL_H

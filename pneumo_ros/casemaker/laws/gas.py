@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of the air: leak, heat, volume, orifice, supply. Flows in kg/s, pressures absolute in Pa."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of valve, tyre, exciter and sensors, and what no family explains: pulses, winds, swinging loads."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a second law is switched on: one row of numbers per family and end, handed to the compiled rig as an array.
 
 Column 0 is the law's number within its family (0: the family has no second law here), the others its parameters. An

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Second laws of what acts between body and axle: friction, hysteresis, damping, mode, stop, area.
 
 Forces push body and axle apart when positive; ``p`` is a row of :mod:`pneumo_ros.casemaker.laws.slots`.

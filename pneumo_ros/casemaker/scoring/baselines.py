@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Four simple rivals of the diagnosis, scored by the same code on the same cases."""
 
 from __future__ import annotations

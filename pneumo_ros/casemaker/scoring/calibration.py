@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether a stated probability means what it says."""
 
 from __future__ import annotations

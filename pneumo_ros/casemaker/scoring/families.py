@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is counted on sets of 0.4 and later: families by foreign laws, several effects at once, budgets and curves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is counted: each score a :class:`Share` or a number, over the cases it is about."""
 
 from __future__ import annotations

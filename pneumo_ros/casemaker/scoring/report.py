@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page of results: every score beside its target and four baselines, every failure, and two plots."""
 
 from __future__ import annotations

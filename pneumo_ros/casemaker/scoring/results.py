@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A diagnosis as the scores see it (contract section 3)."""
 
 from __future__ import annotations

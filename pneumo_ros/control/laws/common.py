@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the laws share: the tracking error of one output, the gains, and the boundary layer.
 
 The sliding laws take a surface S of Eqs. 6.24-6.25 and make S^2/2 fall (Eqs. 6.26-6.30): the wanted third derivative is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The laws, and their dispatch by index."""
 
 from __future__ import annotations

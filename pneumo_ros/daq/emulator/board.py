@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig's board as it presents itself: the identity that the emulator and the checks use."""
 
 from __future__ import annotations

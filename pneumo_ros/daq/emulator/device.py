@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The device's behaviour in Python, rule by rule as firmware/src/core.c.
 
 The emulator runs it; the shared vectors of firmware/vectors hold both to one behaviour.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pseudo-terminal that behaves like the rig's board: same firmware rules, same converters, the plant in real time.
 
 The board's clock and its sampling are ideal: samples are due at exact device times, and one that the computer makes

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faults the emulator can inject, and how they are written: ``kind@start[+duration][:key=value,...]``.
 
 Times are seconds after the valves were armed for the first time; without a duration a fault stays (a reset and a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an emulated board did, in monotonic time: the truth a driver's work is compared with."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What hangs on the emulated board: the rig, its sensors through inverse calibration and converters, its valves."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When within a sample did the command jump?
 
 A log holds the command once a sample, but it may be held over a shorter control period: a jump that the log shows at a

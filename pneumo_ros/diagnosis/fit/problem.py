@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A fit's data and unknowns: logs averaged to fit samples, weights, and the vector of scaled unknowns.
 
 Unknowns, in this order, each scaled to order one: nuisance parameters in prior sigmas, initial-state corrections of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Multiple shooting: a start for the fit where the free run goes astray.
 
 A free run that diverges, or ends up further from the log than the log's own mean, tells a fit nothing about where to

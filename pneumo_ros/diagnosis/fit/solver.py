@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounded robust least squares on the free-run error, by a projected Levenberg-Marquardt of its own.
 
 The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Standard deviations of a fit's parameters, and what is wrong with the parameters themselves."""
 
 from __future__ import annotations

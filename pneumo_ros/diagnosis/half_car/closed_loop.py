@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A log's road through the rig *as diagnosed*, in closed loop: what other gains would do on the rig with its effects.
 
 The rig (:mod:`pneumo_ros.effects.corrected_rig`) is stepped period by period, estimator and controller as a session

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The experiment that would split an ambiguity group: profiles ranked by how far they drive the rivals apart.
 
 Each rival keeps what its own fit of the log gave it, so that on the log they agree; on a candidate profile they are

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A diagnosis from log files: reads them, builds the model with the wanted library, and runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rig after diagnosis, as a file that every verb takes.
 
 ``rig:`` holds what controllers and estimators may believe: parameters at their estimates (the mean of front and rear

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What this log cannot tell apart from the verdict."""
 
 from __future__ import annotations

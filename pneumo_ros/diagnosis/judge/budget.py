@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The budget of the gap: which share of the nominal held-out gap each effect makes, and what is left.
 
 Shares are of the squared nominal gap. The tolerances answer first: what they close alone is the refit's share, and they

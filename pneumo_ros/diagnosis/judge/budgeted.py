@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The budget as the diagnosis tells it: shares, laws, probabilities, measured curves, and the remainder's place."""
 
 from __future__ import annotations

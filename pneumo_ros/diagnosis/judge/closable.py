@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What could be closed: an effect's family against everything at its place, and what nothing in the structure closes.
 
 Three nested models at a place: the law, the family's shape, and whatever may act there. All are fitted to the same logs

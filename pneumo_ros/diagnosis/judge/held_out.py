@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How far: the gap on data that nothing was fitted to."""
 
 from __future__ import annotations

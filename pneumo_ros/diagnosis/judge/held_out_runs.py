@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Structures on logs that nothing was fitted to: the held-out log, and a log of the rig after a known change."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the competition and the held-out log gave: all that verdict, ranking and report are made of."""
 
 from __future__ import annotations

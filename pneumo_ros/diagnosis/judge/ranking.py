@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The ranking of a diagnosis: every structure that was fitted to the end, with what speaks for and against it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From scores to a verdict with a probability for each effect.
 
 Two questions in turn. How much better does a structure fit than the next, on the logs that were fitted and on their

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a person gets to see of a diagnosis: one HTML page, and a log of residuals for plotting tools."""
 
 from pneumo_ros.diagnosis.report.contents import Findings as Findings

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The budget as a picture and as rows: what makes the gap, largest first, and each law as it was measured."""
 
 from __future__ import annotations

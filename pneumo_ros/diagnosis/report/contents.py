@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the report says, in the order a reader needs it; the template only lays it out."""
 
 from __future__ import annotations

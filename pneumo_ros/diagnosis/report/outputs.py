@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The files of a diagnosis: diagnosis.json for programs, report.html for people, residual.mcap for plotting tools."""
 
 from __future__ import annotations

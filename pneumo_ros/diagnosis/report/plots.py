@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Small inline SVG plots: overlays of log and models, residuals, bars. No script, no outside file."""
 
 from __future__ import annotations

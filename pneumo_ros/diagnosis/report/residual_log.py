@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """residual.mcap: the held-out log beside the models' free runs, for PlotJuggler, Foxglove and every reader of logs.
 
 The contract's topics under a prefix each, same types and units: ``/measured``, ``/nominal``, ``/refit``, ``/corrected``

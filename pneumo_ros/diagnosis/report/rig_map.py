@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A drawing of the half car whose parts are coloured by their share of the gap."""
 
 from __future__ import annotations

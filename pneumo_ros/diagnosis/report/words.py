@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verdict in sentences, for the report and for the terminal: what, how sure, how far, and what to do next."""
 
 from __future__ import annotations

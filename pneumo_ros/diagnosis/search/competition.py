@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The competition: nominal re-estimated, single effects, pairs; each fitted with every nuisance parameter free.
 
 Cheap screening first (:mod:`pneumo_ros.diagnosis.search.screening`), short fits of what promises most, then the best to

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Beyond laws and pairs: shapes beside laws, further effects one at a time, exchange, and elimination.
 
 A law of the library is seldom the rig's own. So each structure that leads is fitted once more with the shapes of its

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which candidates are worth a fit: the gain each promises once the nuisance parameters have answered it.
 
 A trial prediction with the effect at a start value moves the outputs by some trajectory (not only infinitesimally: a

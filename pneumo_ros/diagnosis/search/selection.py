@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
 
 Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than

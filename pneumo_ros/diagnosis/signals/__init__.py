@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A log on one time base: what was measured, commanded and driven, with what is missing or doubtful said."""
 
 from pneumo_ros.diagnosis.signals.pair import check_pair as check_pair

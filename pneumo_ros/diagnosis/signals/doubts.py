@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Mistakes of whole topics that would otherwise look like an effect: gauge pressure, a clock set, a wrong unit."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Is a measured channel believable: dead, frozen, saturated, glitching, in the wrong unit, or missing altogether."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The state a log starts from: positions, rates and pressures smoothed from the first few hundredths of a second."""
 
 from __future__ import annotations

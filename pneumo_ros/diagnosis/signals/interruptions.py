@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a driver of hardware did not pass the commands on: openings as applied, or else stretches to leave out."""
 
 from __future__ import annotations

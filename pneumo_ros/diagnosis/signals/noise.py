@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """White sensor noise, estimated from the data alone."""
 
 from __future__ import annotations

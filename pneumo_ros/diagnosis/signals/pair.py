@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Do logs belong together: one rig, different sessions."""
 
 from __future__ import annotations

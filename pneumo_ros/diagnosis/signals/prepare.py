@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From the topics of a log to :class:`Signals`."""
 
 from __future__ import annotations

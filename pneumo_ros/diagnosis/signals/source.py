@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Signals from a log file of the contract, whoever wrote it."""
 
 from __future__ import annotations

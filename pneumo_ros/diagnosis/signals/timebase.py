@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One uniform time base from topics with their own rates, starts, jitter and gaps."""
 
 from __future__ import annotations

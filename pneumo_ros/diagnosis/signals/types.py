@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The typed forms a log takes on its way into the diagnosis."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the gap lives: equation residuals in weak form, flexible corrections by place, regimes, conditional runs."""
 
 from pneumo_ros.diagnosis.where.conditional import conditional_gaps as conditional_gaps

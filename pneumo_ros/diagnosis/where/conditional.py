@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conditional runs: one subsystem simulated, the others fed from measurement.
 
 A subsystem whose own run stays close although the whole drifts off is sound; one that leaves the log while everything

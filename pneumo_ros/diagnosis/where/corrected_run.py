@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A located correction put into the free-running model: what the gap becomes once that place is mended."""
 
 from __future__ import annotations

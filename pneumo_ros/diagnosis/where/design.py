@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The linear problem behind "where": weak residuals of a log, and what each parameter and correction does to them.
 
 Every column is in the unit of its equation; :func:`design_of` divides by what noise and model form explain, so that a

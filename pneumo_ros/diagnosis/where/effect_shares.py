@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where, for a named verdict: how much each place's part of the fitted effects moves the outputs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Local motion and flow at every instant of a log, smoothed: what a correction may depend on.
 
 Velocities and accelerations here only shape corrections; no equation is tested with them.

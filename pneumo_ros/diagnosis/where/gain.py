@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a structure leaves in the equations, and how much better a flexible correction on top predicts held-out data.
 
 The judgement is independent of the free run that fitted the structure: effects act along the measured motion

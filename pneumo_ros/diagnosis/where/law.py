@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is missing at a place as a curve: the residual of its equation over the one quantity that explains it best."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which places make the gap: the smallest set of places whose flexible correction closes it, and each one's fair share.
 
 The corrections are fitted to the weak residuals of the logs to fit and judged on those of the log held out, always with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What effects already in the model do along the measured motion, so that what is left can be told from drift.
 
 A free run that misses something wanders off, and the effects in it act on another motion than the rig's: what they

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When the gap shows: by velocity, opening, flow direction, height, contact, time, frequency and harmonic."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """In one sentence: the place, the regime and the band in which a gap lives."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sets of places: the smallest that closes what can be closed, its rivals, and each place's fair share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bounded, regularised least squares for many subsets of places at once.
 
 Fitted on one log, judged on another: both as quadratic forms, so that a subset costs one small linear solve.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where a gap lives when no shape follows it: which place's equations it moves together, whatever its course in time.
 
 A force that no function of the motion describes (a rotating imbalance, something that strikes, a law met outside what

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Residual of each equation of the half car in weak form: no measured signal is differentiated.
 
 Each equation is multiplied by a smooth window and integrated by parts, so that derivatives fall on the window. With the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hysteresis of the bellows' rubber and cord: a Bouc-Wen element in parallel with the spring.
 
 Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976: z' = v/length (1 - |z|^n)

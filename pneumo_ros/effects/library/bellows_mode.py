@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A mode of the bellows itself: part of its mass moves against the height and answers near its own frequency.
 
 q'' = w^2 (h - q) + 2 zeta w ((1 - g) h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (1 - g) (h' - q')). The

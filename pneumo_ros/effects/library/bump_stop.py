@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A bump stop that meets the strut earlier, or pushes harder, than the nominal one.
 
 k d (1 + a d) (1 - c d(height)/dt) over the depth d: stiffening rubber that loses energy in every contact.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The centre of mass lies ahead of (positive) or behind where the configuration has it."""
 
 from __future__ import annotations

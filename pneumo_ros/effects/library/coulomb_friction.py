@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dry friction of the strut's bushing: LuGre with the steady curve Fc + (Fs - Fc) exp(-(v/vs)^2).
 
 Source: Canudas de Wit, Olsson, Astrom, Lischinsky, "A new model for control of systems with friction", IEEE TAC 40(3),

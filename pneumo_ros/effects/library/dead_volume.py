@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Hose and fittings add a volume that does not change with the height."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bellows' effective area differs from the table, in size and in its slope over height."""
 
 from __future__ import annotations

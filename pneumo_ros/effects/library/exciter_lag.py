@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The road exciter follows its command as a second order lag, so that the tyre meets less road, later."""
 
 from __future__ import annotations

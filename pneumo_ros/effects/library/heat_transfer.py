@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Heat between the spring's air and its wall: energy balance instead of a bare polytropic exponent.
 
 dP/dt gains (n - 1)/V hA (T_wall - T), where T follows from the air's mass (a state) by P V = m R T; the wall stays at

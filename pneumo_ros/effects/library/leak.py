@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Air leaks from a spring to the atmosphere through an opening that no valve commands.
 
 Law 0 is a hole (Eq. 4.11), law 1 a long narrow gap (the laminar mass flow of a gas grows with (P^2 - Pa^2)/T); between

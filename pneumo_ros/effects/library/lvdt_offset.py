@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An LVDT whose zero has moved."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An LVDT whose sensitivity differs from its calibration: reads (1 + error) times the height above the datum."""
 
 from __future__ import annotations

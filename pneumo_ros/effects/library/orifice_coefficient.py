@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The discharge coefficient of an end's orifices differs from the nominal by more than its tolerance (Eq. 4.7).
 
 A sharp-edged orifice's coefficient falls as the flow unchokes, from 0.84 at a deep vacuum downstream to 0.6 for a small

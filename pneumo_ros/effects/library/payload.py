@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A load on the body that the configuration does not know, at the centre of mass."""
 
 from __future__ import annotations

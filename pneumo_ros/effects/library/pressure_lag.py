@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pressure sensor at the end of a tube, or slow in itself: second order lag, 1/((lag s)^2 + 2 damping lag s + 1).
 
 A short tube rings (damping below one), a long or throttled one creeps like a first order lag (damping well above it).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pressure sensor whose zero has moved."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pressure sensor whose sensitivity is off; it may pivot about vacuum (absolute cell) or the atmosphere (gauge
 cell).
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The supply's pressure sags with the flow drawn: a tank refilled through a regulator of finite stiffness.
 
 d(drop)/dt = (resistance W - drop)/tau, W the inflow of both springs; the tank is steady at the first instant.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands reach the valves late by a pure delay (bus, driver, line), any fraction of a sample."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tyre's rubber damps: a viscous force beside its stiffness (the thesis neglects it)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A tyre pushes but does not pull: above the ground its force is gone (the nominal tyre is linear in both signs)."""
 
 from __future__ import annotations

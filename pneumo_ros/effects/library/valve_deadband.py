@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The valve does not answer small commands: overlap near the seat, and a spool that sticks until pulled far enough."""
 
 from __future__ import annotations

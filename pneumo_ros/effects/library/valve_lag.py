@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inlet valve follows its command as a second order lag: 1/((lag s)^2 + 2 damping lag s + 1)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8).
 
 -c (1 + b |v|) v: b is how much the constant grows, or falls, with speed.

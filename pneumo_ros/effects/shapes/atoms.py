@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atoms: the simple laws whose sums make a family's shape, and the effects that are made of them.
 
 A compiled term holds all atoms of a place and reads their amplitudes; a family's shape is an effect that fits some of

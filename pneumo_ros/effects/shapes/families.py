@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shapes of all families, by the family's id, and what may act at each kind of place."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atoms of a force between body and axle: friction, damping, stops, hysteresis, errors of the spring.
 
 Positive upwards on the body. Friction and damping are saturating ramps and powers of the strut's rate, each for

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atoms of what happens to a signal on its way: valves, exciter and sensors.
 
 A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead

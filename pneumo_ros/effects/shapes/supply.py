@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atoms of a supply that sags with the flow drawn from it: memories of flow and of its square (a hose, an orifice)."""
 
 from __future__ import annotations

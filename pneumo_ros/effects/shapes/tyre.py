@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness."""
 
 from __future__ import annotations

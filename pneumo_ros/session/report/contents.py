@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the session's page says, as plain rows; the template only lays it out."""
 
 from __future__ import annotations

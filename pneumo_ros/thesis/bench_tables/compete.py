@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which law closes the gap of a table, judged on payloads that nothing was fitted to.
 
 Each of the four payload columns is held out in turn; a law is fitted to the other three. The gap is the rms of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The air spring on a shaker: what Tables 5.4 and 5.5 say, and the static tables the Chapter 5 model looks up."""
 
 from __future__ import annotations

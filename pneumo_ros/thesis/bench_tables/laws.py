@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the Chapter 5 model predicts for the two tables, and what it might miss.
 
 Natural frequency: w^2 = k/m with k the slope of (P - patm) A(h, P) at the static height, the air sealed (P V^n

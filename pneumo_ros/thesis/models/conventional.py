@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The half car on linear springs and dampers (Eqs. 3.1-3.4), passive or with skyhook semi-active dampers (2.5.3).
 
 State (8): heave, pitch, unsprung front and rear [m, rad, m, m], then their rates, all measured from static equilibrium:

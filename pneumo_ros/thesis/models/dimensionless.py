@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The dimensionless equations, in Pi-numbers alone: two cars with equal Pi-numbers are one car here.
 
 Conventional half car: Eqs. 3.39-3.42 with their typing corrected (signs of pitch as in the plant, damping ratios over

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A payload on a sealed air spring on a shaker (Sections 5.4 to 5.6, Eq. 5.8): the frequency response experiment.
 
 The valves are shut, so the air's mass is constant and its pressure follows the volume: P V^n = const (Eq. 4.18).

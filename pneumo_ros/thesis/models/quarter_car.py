@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quarter car on one air spring (Eqs. 4.53-4.57, corrected by errata 7) and its compiled integrator.
 
 State (5): sprung and unsprung height [m], their rates, spring pressure [Pa absolute]. All z

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quarter car's controllers and their closed loop in one compiled run: Sections 6.3 to 6.6 for ensembles.
 
 As in the thesis the controller knows the true heights, rates and acceleration and one inlet valve acts, held over a

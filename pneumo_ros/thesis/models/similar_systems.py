@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Four systems written with every constant as a parameter, so that similitude can be tried on them.
 
 Air spring under a mass (Eqs. 4.22-4.23), quarter car (4.53-4.55) and half car (4.63-4.72) on air springs; their

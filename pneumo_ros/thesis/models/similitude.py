@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Dimensional analysis by linear algebra, and the scaling laws between a full-scale car and the rig.
 
 Eqs. 3.5-3.34 (Pi-numbers); Eqs. 3.43-3.54, 4.43-4.52, 4.62, 4.79-4.80 (laws). Only the dimensions

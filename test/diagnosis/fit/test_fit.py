@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fit, screening, competition and verdict on the model's own data, where the truth is known."""
 
 from __future__ import annotations

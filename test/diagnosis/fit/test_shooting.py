@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Multiple shooting on a plant whose free run leaves the log behind: an unstable one, held by the logged input."""
 
 from __future__ import annotations

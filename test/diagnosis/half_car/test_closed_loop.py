@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop around a diagnosed rig closes exactly, and a diagnosed effect changes the ride."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two of the reference logs, made by other software with other laws, end to end."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From scores to a verdict: what makes an effect accepted, unknown, or nothing."""
 
 from __future__ import annotations

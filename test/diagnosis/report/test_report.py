@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report page and the log of residuals: complete, self-contained, true to the numbers they are given."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A stop that is hit once: whichever blocks the hit lies in, it is fitted, and it is accepted."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a driver of hardware made of the commands: openings as applied, stretches left out, messages that came late."""
 
 from __future__ import annotations

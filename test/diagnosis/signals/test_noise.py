@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensor noise out of logs whose valves chatter: the loop is closed, so the command carries noise into the pressure."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bringing a log onto one time base, and what is said about logs that are not what they should be."""
 
 from __future__ import annotations

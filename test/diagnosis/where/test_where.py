@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where the gap lives: equation residuals, the smallest set of places, regimes and conditional runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Flexible corrections: what each place could add to the model, in general shapes rather than named effects.
 
 A place's shapes are smooth and saturating functions of the local motion, memory of several lengths, flow and opening.

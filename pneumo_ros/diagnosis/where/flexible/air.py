@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of an error in a spring's air balance (valve, orifices, leak, heat, volume), as mass flow into the spring."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One shape that a flexible correction may take."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of a force or moment on the body from outside the springs (mass, payload, guide friction)."""
 
 from __future__ import annotations

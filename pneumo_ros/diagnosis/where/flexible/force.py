@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of an error in a spring's force (area, friction, damping, hysteresis, stops)."""
 
 from __future__ import annotations

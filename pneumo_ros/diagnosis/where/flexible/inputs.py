@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of an error in what drives the rig: the road under the tyres, the air supply."""
 
 from __future__ import annotations

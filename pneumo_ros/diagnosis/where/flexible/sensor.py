@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of an error in a measured channel (offset, scale, lag, curvature)."""
 
 from __future__ import annotations

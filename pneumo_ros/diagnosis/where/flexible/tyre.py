@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shapes of an error in a tyre's force (stiffness, damping, lift-off, hysteresis)."""
 
 from __future__ import annotations

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Typer app that reads its commands' annotations itself, so that Ubuntu 24.04's Typer 0.9 takes them too.
+
+Typer 0.9 reads neither an ``Annotated`` that ``from __future__ import annotations`` left as text nor ``X | None``; the
+later ones do. Resolved hints with ``Optional`` mean the same to all of them.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import typer
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+class App(typer.Typer):
+    """Typer, with resolved annotations."""
+
+    def command(self, *args: Any, **options: Any) -> Callable[[Function], Function]:
+        """See ``typer.Typer.command``."""
+        register = super().command(*args, **options)
+        return lambda function: register(resolved(function))
+
+    def callback(self, *args: Any, **options: Any) -> Callable[[Function], Function]:
+        """See ``typer.Typer.callback``."""
+        register = super().callback(*args, **options)
+        return lambda function: register(resolved(function))
+
+
+def resolved(function: Function) -> Function:
+    """The function, its annotations objects instead of text and its unions spelled the older way."""
+    hints = get_type_hints(function, include_extras=True)
+    function.__annotations__ = {name: _spelled(hint) for name, hint in hints.items()}
+    return function
+
+
+def _spelled(hint: Any) -> Any:
+    if get_origin(hint) is Annotated:
+        kind, *notes = get_args(hint)
+        return Annotated[(_spelled(kind), *notes)]
+    return Union[get_args(hint)] if isinstance(hint, types.UnionType) else hint  # noqa: UP007 (it is the point)
