@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
-from contextlib import nullcontext
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +21,9 @@ from pneumo_ros.errors import InputError
 if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
     from pneumo_ros.rig import Rig
+    from pneumo_ros.session.claim import Claim
     from pneumo_ros.session.plan import Tables, Values
+    from pneumo_ros.session.supervisor import Place
 
 app = typer.Typer(add_completion=False)
 FAILED = 1
@@ -63,9 +68,22 @@ def run(
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
     output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
-    domain_id: Annotated[
-        int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
+    domain: Annotated[
+        int | None,
+        typer.Option(
+            "--domain",
+            "--domain-id",
+            help="DDS domain, where no other session may be; the environment's by default.",
+            min=0,
+            max=232,
+        ),
     ] = None,
+    isolate: Annotated[bool, typer.Option("--isolate", help="Take a free DDS domain.")] = False,
+    namespace: Annotated[str, typer.Option(help="ROS namespace of nodes and topics, one for each rig: rig1.")] = "",
+    use_sim_time: Annotated[
+        bool, typer.Option("--use-sim-time", help="Nodes that do not give the samples their time follow /clock.")
+    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Print what the nodes say.")] = False,
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
     ] = False,
@@ -75,7 +93,12 @@ def run(
     """Run a session: simulate the rig in closed loop and log it."""
     from pneumo_ros.cli.view import beside
     from pneumo_ros.session.plan import assign, parse_setting, read_config
+    from pneumo_ros.session.supervisor import Place
 
+    if isolate and domain is not None:
+        raise InputError("either a domain or any free one", where="--isolate", key="--domain", value=domain,
+                         remedy="leave one of them out")  # fmt: skip
+    place = _namespace(namespace)
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
     if valves is not None:
@@ -97,12 +120,39 @@ def run(
     console = Console()
     if checked.effects:
         _tell_effects(console, checked, source)
-    with beside(domain_id) if view else nullcontext() as dashboard:
-        _run_session(console, values, target, single_process, domain_id)
-        _report(console, target, values, picture, report)
-        if dashboard is not None:
-            console.print("the dashboard stays until Ctrl-C")
-            dashboard.wait()
+    if use_sim_time:
+        for own in values.values():
+            own["use_sim_time"] = True
+    with _alone(domain, place, isolate, f"{source}, {target}") as claim:
+        if isolate:
+            console.print(f"isolated in domain {claim.domain}")
+        with beside(claim.domain, place) if view else nullcontext() as dashboard:
+            there = Place(claim.domain, place, (claim.descriptor,))
+            _run_session(console, values, target, single_process, there, verbose)
+            _report_unless_asked_to_end(console, target, values, picture, report)
+            if dashboard is not None:
+                console.print("the dashboard stays until Ctrl-C")
+                dashboard.wait()
+
+
+def _namespace(text: str) -> str:
+    """'' or /name[/name...], from what the user wrote."""
+    bare = text.strip("/")
+    if bare and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", bare):
+        raise InputError("not a ROS namespace", where="--namespace", value=text, allowed="letters, digits, _ and /")
+    return f"/{bare}" if bare else ""
+
+
+@contextmanager
+def _alone(domain: int | None, namespace: str, isolate: bool, what: str) -> Iterator[Claim]:
+    """A place in the ROS graph where no other session is; nothing is started before that is known."""
+    from pneumo_ros.nodes.neighbours import claim_place
+
+    claim = claim_place(domain, namespace, isolate, what)
+    try:
+        yield claim
+    finally:
+        claim.release()
 
 
 def _player(controller: str) -> str:
@@ -184,7 +234,12 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
         if rig is not None:
             own["rig"] = str(rig.resolve())
     values["session_recorder"]["output"] = str(target)
-    values["session_recorder"]["session"] = json.dumps({**session, "parameters": json.dumps(values)})
+    identity = uuid.uuid4().hex
+    values["session_recorder"]["session"] = json.dumps(
+        {**session, "session_id": identity, "parameters": json.dumps(values)}
+    )
+    for own in values.values():
+        own["session_id"] = identity
 
 
 def _tell_effects(console: Console, rig: Rig, source: str) -> None:
@@ -249,10 +304,12 @@ def _check_hardware(own: dict[str, Value], single_process: bool) -> None:
         )
 
 
-def _run_session(console: Console, values: Values, target: Path, single_process: bool, domain_id: int | None) -> None:
+def _run_session(
+    console: Console, values: Values, target: Path, single_process: bool, place: Place, verbose: bool
+) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
+    from pneumo_ros.session.supervisor import NodeProcess, SessionError, StopAsked, Supervisor
 
     rig_node = "daq" if "daq" in values else "plant"
     names = ("single_process",) if single_process else session_nodes("serial" if rig_node == "daq" else "sim")
@@ -268,9 +325,8 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
     length = float(values[rig_node]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
-        for number in (signal.SIGINT, signal.SIGTERM):  # set both: a background job inherits an ignored SIGINT
-            signal.signal(number, signal.default_int_handler)  # either ends the session in order
-        supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
+        show = (lambda node, line: console.print(f"{node}: {line}", markup=False)) if verbose else (lambda _, __: None)
+        supervisor = Supervisor(nodes, values, lead, place, lambda t: progress.update(task, completed=t), show)
         try:
             with supervisor:
                 supervisor.wait()
@@ -279,9 +335,29 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
             Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
             _save_what_is_left(target)
             raise typer.Exit(FAILED) from error
-        except KeyboardInterrupt:
+        except StopAsked as asked:
             progress.stop()
-            console.print("stopped by the user; the log is finished")
+            _tell_stopped(console, target, str(asked))
+
+
+def _tell_stopped(console: Console, target: Path, by: str) -> None:
+    """One sentence that is true: with a log or without one."""
+    if target.exists():
+        console.print(f"stopped by {by}; the log is finished")
+        return
+    console.print(f"stopped by {by} before there was anything to log")
+    raise typer.Exit
+
+
+def _report_unless_asked_to_end(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+    """The session and its log are done; who asks again to end gets no report."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        _report(console, target, values, picture, page)
+    except KeyboardInterrupt:
+        console.print(f"no report was made; log {target}")
+        raise typer.Exit from None
 
 
 def _save_what_is_left(target: Path) -> None:

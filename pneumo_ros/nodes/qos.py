@@ -9,7 +9,7 @@ from pneumo_ros.log.topics import BY_NAME, Flow
 
 RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
 
-_DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10}
+_DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10, Flow.STOP: 10}
 
 
 def publisher_qos(flow: Flow, lockstep: bool) -> QoSProfile:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 from typing import IO
 
 import yaml
@@ -34,6 +35,35 @@ class SessionError(PneumoError):
     """A node of the session ended by itself."""
 
 
+class StopAsked(Exception):  # noqa: N818  it is a wish, not an error
+    """Somebody asked the session to end: Ctrl-C, SIGTERM, or a terminal that was closed."""
+
+
+STOPPING = {signal.SIGINT: "the user", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP (closed terminal)"}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in the ROS graph a session runs.
+
+    Attributes
+    ----------
+    domain_id : DDS domain
+    namespace : of its nodes and topics, '' or of the form /rig1
+    descriptors : files that stay open in every node, so that the place counts as taken until the last one has ended
+    """
+
+    domain_id: int | None = None
+    namespace: str = ""
+    descriptors: tuple[int, ...] = ()
+
+    def arguments(self) -> list[str]:
+        """ROS arguments of a node. /clock is absolute by convention; each session has its own."""
+        if not self.namespace:
+            return []
+        return ["--remap", f"__ns:={self.namespace}", "--remap", "/clock:=clock"]
+
+
 @dataclass
 class NodeProcess:
     """A process of the session: which nodes it holds, how it is called, and what it said last."""
@@ -52,7 +82,8 @@ class NodeProcess:
 def write_parameters(values: Mapping[str, Mapping[str, Value]], folder: Path) -> Path:
     """A ROS 2 parameter file: node -> name -> value."""
     path = folder / "parameters.yaml"
-    document = {node: {"ros__parameters": dict(own)} for node, own in values.items()}
+    # In whatever namespace the nodes are.
+    document = {f"/**/{node}": {"ros__parameters": dict(own)} for node, own in values.items()}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path
 
@@ -65,10 +96,12 @@ class Supervisor:
     nodes : one process each, in the order they are stopped; the recorder is always stopped last
     parameters : node -> name -> value
     lead : process whose end with exit code 0 ends the session
-    domain_id : DDS domain, or None for the environment's
+    place : where its nodes are in the ROS graph
     on_progress : called with the simulated time in s
+    on_line : called with every other line that a node prints
 
-    A context manager: leaving it ends every process.
+    A context manager: leaving it ends every process. Between, SIGINT, SIGTERM and SIGHUP end :meth:`wait`; further ones
+    change nothing, so that the log is finished however often somebody asks.
     """
 
     def __init__(
@@ -76,29 +109,38 @@ class Supervisor:
         nodes: Sequence[NodeProcess],
         parameters: Mapping[str, Mapping[str, Value]],
         lead: str,
-        domain_id: int | None = None,
+        place: Place | None = None,
         on_progress: Callable[[float], None] = lambda _: None,
+        on_line: Callable[[str, str], None] = lambda _, __: None,
     ) -> None:
+        self._place = place or Place()
         self.nodes = list(nodes)
         self.lead = next(n for n in self.nodes if n.name == lead)
         self._parameters = parameters
-        self._on_progress = on_progress
+        self._on_progress, self._on_line = on_progress, on_line
+        self._asked_by = ""
+        self._rosout = not any(own.get("mode") == "lockstep" for own in parameters.values())
         self._folder = tempfile.TemporaryDirectory(prefix="pneumo-")
         self._lines: queue.SimpleQueue[tuple[NodeProcess, str]] = queue.SimpleQueue()
         self._environment = dict(os.environ)
         # A session stays on this computer unless the user opened it to the network.
         self._environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        if domain_id is not None:
-            self._environment["ROS_DOMAIN_ID"] = str(domain_id)
+        if self._place.domain_id is not None:
+            self._environment["ROS_DOMAIN_ID"] = str(self._place.domain_id)
         self._environment[END_REASON] = str(Path(self._folder.name) / "end_reason")
         self._environment[SUPERVISOR] = str(os.getpid())
         self._progress = -1.0
 
     def __enter__(self) -> Supervisor:
         file = write_parameters(self._parameters, Path(self._folder.name))
+        arguments = ["--ros-args", "--params-file", str(file), *self._place.arguments()]
+        if not self._rosout:  # thousands of samples a second leave no time for a topic nobody reads
+            arguments.append("--disable-rosout-logs")
+        for number in STOPPING:  # each of them: a background job inherits an ignored SIGINT
+            signal.signal(number, self._on_signal)
         for node in self.nodes:
             node.process = subprocess.Popen(
-                [sys.executable, "-m", node.module, "--ros-args", "--params-file", str(file)],
+                [sys.executable, "-m", node.module, *arguments], pass_fds=self._place.descriptors,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=self._environment,
                 start_new_session=True,  # Ctrl-C reaches this process alone; it then ends the others in order
             )  # fmt: skip
@@ -110,6 +152,9 @@ class Supervisor:
         self.stop(str(error) if isinstance(error, SessionError) else "")
         self._folder.cleanup()
 
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._asked_by = self._asked_by or STOPPING[signal.Signals(number)]
+
     def wait(self) -> None:
         """Until the lead has done its work.
 
@@ -117,10 +162,14 @@ class Supervisor:
         ------
         SessionError
             naming the node that ended too early, with its exit code and last words.
+        StopAsked
+            naming who asked for the end.
         """
         start = time.monotonic()
         while True:
             self._hear()
+            if self._asked_by:
+                raise StopAsked(self._asked_by)
             for node in self.nodes:
                 assert node.process is not None
                 code = node.process.poll()
@@ -131,7 +180,7 @@ class Supervisor:
                     self._hear()
                     raise SessionError(describe_end(node, code))
             if self._progress < 0.0 and time.monotonic() - start > START_PATIENCE:
-                raise SessionError(f"no first sample within {START_PATIENCE:.0f} s; is another session on this domain?")
+                raise SessionError(f"no first sample within {START_PATIENCE:.0f} s; the nodes did not find each other")
             time.sleep(POLL)
 
     def stop(self, failure: str = "") -> None:
@@ -164,7 +213,9 @@ class Supervisor:
                 return
             node.said.append(line)
             del node.said[:-200]
-            if line.startswith(PROGRESS):
+            if not line.startswith(PROGRESS):
+                self._on_line(node.name, line.rstrip("\n"))
+            else:
                 self._progress = float(line[len(PROGRESS) :])
                 self._on_progress(self._progress)
 
@@ -179,6 +230,7 @@ def describe_end(node: NodeProcess, code: int) -> str:
 def _signal(node: NodeProcess, number: signal.Signals) -> None:
     if node.process is not None and node.process.poll() is None:
         node.process.send_signal(number)
+        node.process.send_signal(signal.SIGCONT)  # a stopped process could not obey
 
 
 def _wait_or_kill(node: NodeProcess, end: float) -> None:
