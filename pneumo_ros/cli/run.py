@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import signal
 import uuid
@@ -148,6 +149,8 @@ def _alone(domain: int | None, namespace: str, isolate: bool, what: str) -> Iter
     """A place in the ROS graph where no other session is; nothing is started before that is known."""
     from pneumo_ros.nodes.neighbours import claim_place
 
+    # A session stays on this computer unless the user opened it to the network.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     claim = claim_place(domain, namespace, isolate, what)
     try:
         yield claim
@@ -193,6 +196,8 @@ def _options(
     road: str, duration: float, speed: float, controller: str, seed: int, rate: float, realtime: bool, source: str
 ) -> list[tuple[str, str, Any]]:
     """The command line's options as settings of nodes."""
+    from pneumo_ros.control.presets import controller_settings
+
     return [
         *_road_options(road),
         ("road_profile", "speed_kmh", speed),
@@ -201,23 +206,9 @@ def _options(
         ("**", "session_nodes", ",".join(session_nodes(source))),
         (RIG_NODES[source], "duration", duration),
         (RIG_NODES[source], "report_progress", True),
-        *_controller_options(ALIASES.get(controller, controller)),
+        *controller_settings(ALIASES.get(controller, controller)),
         ("**", "rate_hz", rate),
         ("**", "mode", "realtime" if realtime or source == "serial" else "lockstep"),
-    ]
-
-
-def _controller_options(name: str) -> list[tuple[str, str, Any]]:
-    """A preset's values for estimator and controller, or a member of the controller family with its defaults."""
-    from pneumo_ros.control.presets import PRESETS
-
-    if name not in PRESETS:
-        return [("controller", "controller", name)]
-    preset = PRESETS[name]
-    own = {"controller": "first_order_smflc", **preset.controller}
-    return [
-        *(("estimator", key, value) for key, value in preset.estimator.items()),
-        *(("controller", key, value) for key, value in own.items()),
     ]
 
 

@@ -37,7 +37,7 @@ from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
 from pneumo_ros.nodes.sources import SoleSource
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.supervisor import SUPERVISOR
+from pneumo_ros.session.supervisor import SUPERVISOR, noted_failure
 from pneumo_ros.session.timing import LoopTiming
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
@@ -327,10 +327,10 @@ def tell_end(node: RigNode, elapsed: float, values: Mapping[str, str] | None = N
 
     A session without a duration is over when it is stopped; one with a duration was cut short.
     """
-    duration = float(node.values["duration"])
-    if duration or node.stop.failed:
-        length = f" of {duration:g} s" if duration else ""
-        node.event(WARN, "session_stopped", f"cut short after {elapsed:.3f} s{length}", values)
+    duration, failure = float(node.values["duration"]), noted_failure() or node.stop.reason
+    if duration or failure:
+        length, why = f" of {duration:g} s" if duration else "", f": {failure}" if failure else ""
+        node.event(WARN, "session_stopped", f"cut short after {elapsed:.3f} s{length}{why}", values)
     else:
         node.event(OK, "session_complete", f"stopped by the user after {elapsed:.3f} s", values)
 

@@ -42,8 +42,6 @@ def claim_place(domain: int | None, namespace: str, isolate: bool, what: str) ->
     InputError
         naming who is there.
     """
-    # As the nodes will: a session stays on this computer unless the user opened it to the network.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     if not isolate:
         return _claim(environment_domain() if domain is None else domain, namespace, what)
     first = os.getpid() % len(ISOLATED)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
@@ -25,7 +24,7 @@ from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.course import RIG_NODES, Course
-from pneumo_ros.session.supervisor import END_REASON
+from pneumo_ros.session.supervisor import noted_failure
 
 DRAIN_LIMIT = 5.0  # s
 WATCH_PERIOD = 0.1  # s between looks whether the stamps written are in order
@@ -35,12 +34,6 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("output", "session.mcap", "", "log file to write (.mcap)", read_only=True),
     Parameter("session", "{}", "", "what else explains the run, a JSON object of texts", read_only=True),
 )
-
-
-def _noted() -> str:
-    """Why the session failed, as its supervisor left it."""
-    note = os.environ.get(END_REASON)
-    return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else ""
 
 
 class SessionRecorderNode(RigNode):
@@ -135,7 +128,7 @@ class SessionRecorderNode(RigNode):
         self._watch()
         self.stop.set = True
         reason = self.stop.reason if self.stop.failed else ""
-        complete, why = self.course.verdict(RIG_NODES & self.session_nodes, _noted() or reason)
+        complete, why = self.course.verdict(RIG_NODES & self.session_nodes, noted_failure() or reason)
         self.written = self.writer.finish(complete, why)
 
     def drain(self, executor: Executor) -> None:

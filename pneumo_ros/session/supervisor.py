@@ -31,6 +31,12 @@ RECORDER = "session_recorder"
 END_REASON = "PNEUMO_END_REASON"  # environment variable: file in which the supervisor says why a session failed
 
 
+def noted_failure() -> str:
+    """Why the session failed, as its supervisor (or launch) left it to this node; '' if it did not."""
+    note = os.environ.get(END_REASON)
+    return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else ""
+
+
 class SessionError(PneumoError):
     """A node of the session ended by itself."""
 
