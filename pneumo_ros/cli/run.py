@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from pneumo_ros.cli.tables import summary_table, timing_table
 from pneumo_ros.errors import InputError
@@ -323,7 +324,9 @@ def _run_session(
                 supervisor.wait()
         except SessionError as error:
             progress.stop()
-            Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
+            Console(stderr=True, highlight=False, soft_wrap=True).print(
+                f"[red]session failed:[/red] {escape(str(error))}"
+            )
             _save_what_is_left(target)
             raise typer.Exit(FAILED) from error
         except StopAsked as asked:

@@ -14,7 +14,7 @@ from pneumo_ros.rig.channels import CHANNELS, DISPLACEMENTS, ESTIMATE_FIELDS, RO
 class Flow(Enum):
     """Quality of service of a topic (REP 2003), with the reason."""
 
-    STREAM = "reliable, keep last 200, volatile: one sample a control period; the log must not miss one"
+    STREAM = "reliable, keep last 200 (lockstep 2000), volatile: one sample a control period; the log must not miss one"
     CLOCK = "best effort in real time, reliable in lockstep, keep last 1: only the newest time matters"
     LATCHED = "reliable, keep last 1, transient local: a late subscriber still learns it"
     EVENTS = "reliable, keep last 100, transient local: rare, each one matters, also to a late subscriber"

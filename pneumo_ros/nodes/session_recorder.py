@@ -124,9 +124,10 @@ class SessionRecorderNode(RigNode):
     def on_stop(self, executor: Executor) -> None:
         """Take what is still in the queues, then finish the file."""
         self.drain(executor)
-        self.stop.set = False  # the last messages too must be in order
-        self._watch()
-        self.stop.set = True
+        if not self.stop.failed:
+            self.stop.set = False  # the last messages too must be in order
+            self._watch()
+            self.stop.set = True
         reason = self.stop.reason if self.stop.failed else ""
         complete, why = self.course.verdict(RIG_NODES & self.session_nodes, noted_failure() or reason)
         self.written = self.writer.finish(complete, why)

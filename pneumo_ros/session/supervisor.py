@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import queue
+import re
 import signal
 import subprocess
 import sys
@@ -24,6 +25,7 @@ from pneumo_ros.parameters import Value
 SUPERVISOR = "PNEUMO_SUPERVISOR"  # environment variable: process whose end ends the nodes as well
 PROGRESS = "PROGRESS "
 POLL = 0.02  # s
+LOGGED = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[")  # how rcl's logger begins a line
 STOP_PATIENCE = 5.0  # s a process has to end after SIGINT before it is killed
 RECORDER_PATIENCE = 60.0  # s; a slow disk may still be taking the log
 START_PATIENCE = 60.0  # s until the first sample; the first start on a machine compiles the plant
@@ -80,9 +82,10 @@ class NodeProcess:
     said: list[str] = field(default_factory=list)
 
     def last_words(self) -> str:
-        """The last line it printed."""
+        """The last line it printed; one of its logger only if there is no other."""
         lines = [line for line in self.said if line.strip() and not line.startswith(PROGRESS)]
-        return lines[-1].strip() if lines else ""
+        plain = [line for line in lines if not LOGGED.match(line)]
+        return (plain or lines)[-1].strip() if lines else ""
 
 
 def write_parameters(values: Mapping[str, Mapping[str, Value]], folder: Path) -> Path:
