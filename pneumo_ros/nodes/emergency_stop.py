@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
@@ -17,30 +18,37 @@ from pneumo_ros.nodes.interfaces import message_class
 TRIP_SERVICE, RESET_SERVICE = "rig/estop_trip", "rig/estop_reset"
 CLOSED = np.zeros(4)  # m2: closed valves hold the air in the springs, as without power
 _FLAG = 4  # offset of the bool in a serialised std_msgs/Bool
-# No single subscription hears every publisher: one that asks for reliability is not matched by a best effort panel, one
-# that does not may miss what a reliable one says, and only one that asks for history hears a panel that pressed before.
-HEARD = tuple(
-    QoSProfile(depth=10, reliability=reliability, durability=durability)
-    for reliability, durability in (
-        (ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE),
-        (ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.VOLATILE),
-        (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL),
-    )
-)
+RELIABLE = QoSProfile(depth=10)
+ANY = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+HISTORY = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def hear_stops(node: Node, trip: Callable[[str], None]) -> None:
     """Call ``trip("topic")`` at every `true` on /rig/estop, whatever its publisher's quality of service.
 
+    No single subscription hears every publisher: one that asks for reliability is not matched by a best effort panel,
+    one that does not may miss what a reliable one says, and only one that asks for history hears a panel that pressed
+    before. The third is made when such a panel is there: an ordinary one would be told that it does not fit.
+
     `false` does nothing: a publisher that comes and goes must not release the rig.
     """
+    with_history: list[object] = []
 
     def on_message(data: bytes) -> None:
         if len(data) > _FLAG and data[_FLAG]:
             trip("topic")
 
-    for profile in HEARD:
-        node.create_subscription(message_class(ESTOP.type), ESTOP.relative, on_message, profile, raw=True)
+    def subscribe(profile: QoSProfile, events: SubscriptionEventCallbacks) -> object:
+        kind = message_class(ESTOP.type)
+        return node.create_subscription(kind, ESTOP.relative, on_message, profile, event_callbacks=events, raw=True)
+
+    def on_matched(_: object) -> None:
+        there = [info.qos_profile for info in node.get_publishers_info_by_topic(ESTOP.relative)]
+        if not with_history and any(offered.durability == DurabilityPolicy.TRANSIENT_LOCAL for offered in there):
+            with_history.append(subscribe(HISTORY, SubscriptionEventCallbacks(use_default_callbacks=False)))
+
+    subscribe(RELIABLE, SubscriptionEventCallbacks(use_default_callbacks=False))
+    subscribe(ANY, SubscriptionEventCallbacks(matched=on_matched, use_default_callbacks=False))
 
 
 class EmergencyStop:

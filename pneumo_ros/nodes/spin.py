@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from pneumo_ros.daq.priority import freeze_startup_objects
 from pneumo_ros.errors import PneumoError
-from pneumo_ros.nodes.base import RigNode, StopRequest
+from pneumo_ros.nodes.base import FAILED, RigNode, StopRequest, say
 from pneumo_ros.session.supervisor import SUPERVISOR
 
 SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
@@ -39,7 +39,9 @@ class SignalStop(StopRequest):
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if number != signal.SIGINT and not self.set:
-            self.failed, self.reason = True, f"stopped by {signal.Signals(number).name}"
+            alone = SUPERVISOR in os.environ and os.getppid() != int(os.environ[SUPERVISOR])
+            why = "the session's supervisor was killed" if alone else f"stopped by {signal.Signals(number).name}"
+            self.failed, self.reason = True, why
         self.set = True
 
 
@@ -94,7 +96,10 @@ def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = 
         spin_once(SPIN_TIMEOUT)
     for node in nodes:
         node.on_stop(executor)
-    return max(node.exit_code for node in nodes)
+    code = max(node.exit_code for node in nodes)
+    if stop.failed and not code:  # ended from outside
+        say(f"error: {stop.reason}", sys.stderr)
+    return code or (FAILED if stop.failed else 0)
 
 
 def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> int:

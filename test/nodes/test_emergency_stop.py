@@ -248,8 +248,7 @@ def test_stop_during_arming(bench: Bench) -> None:
     panel.publish(Bool(data=True))
     node.trigger_activate()  # blocks until the board has followed; the stop waits in the queue
     bench.until(lambda: node.driver is not None and node.driver.core.mode is Mode.ESTOP, "the stop")
-    if node.state_label == "active":
-        node.trigger_deactivate()
+    bench.until(lambda: node.state_label == "inactive", "the node to leave active by itself")
     bench.assert_stopped()
 
 
@@ -257,7 +256,7 @@ def test_armed_stop_closes_the_valves(bench: Bench) -> None:
     node = bench.arm()
     bench.press()
     assert node.driver is not None and node.driver.core.mode is Mode.ESTOP
-    node.trigger_deactivate()
+    bench.until(lambda: node.state_label == "inactive", "the node to leave active by itself")
     bench.assert_stopped()
 
 
@@ -319,7 +318,9 @@ def test_it_is_kept_over_a_restart_of_the_node(bench: Bench, configured: bool) -
 def test_the_same_board_in_another_domain_is_still_stopped(bench: Bench) -> None:
     bench.healthy()
     bench.press()
-    bench.start(sessions.own_domain())
+    node = bench.start(sessions.own_domain())
+    assert node.operator.latch.found() == "", "nobody has pressed here"
+    bench.configure()
     bench.assert_stopped()
 
 
