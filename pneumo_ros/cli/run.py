@@ -331,11 +331,15 @@ def _run_session(
             raise typer.Exit(FAILED) from error
         except StopAsked as asked:
             progress.stop()
-            _tell_stopped(console, target, str(asked))
+            _tell_stopped(console, target, str(asked), supervisor.failure_of_lead())
 
 
-def _tell_stopped(console: Console, target: Path, by: str) -> None:
-    """One sentence that is true: with a log or without one."""
+def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None:
+    """One sentence that is true: with a log or without one, after a trip or without."""
+    if failure:
+        console.print(f"stopped by {by}, after this: {failure}", markup=False, soft_wrap=True)
+        _save_what_is_left(target)
+        raise typer.Exit(FAILED)
     if target.exists():
         console.print(f"stopped by {by}; the log is finished")
         return

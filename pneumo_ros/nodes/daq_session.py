@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.daq.reasons import Event
 from pneumo_ros.nodes.base import ERROR, OK, say, tell_end
 
 if TYPE_CHECKING:
@@ -40,9 +41,18 @@ class SessionCourse:
             self._asked = time.monotonic()
 
     def tell_end(self) -> None:
-        """Say how far the session came, if it was ended from outside."""
-        if self._first_ns and not self._over:
-            tell_end(self._node, (time.monotonic_ns() - self._first_ns) * 1e-9)
+        """Say how far the session came, if it was ended from outside, and whether the valves were driven until then."""
+        if not self._first_ns or self._over:
+            return
+        tell_end(self._node, (time.monotonic_ns() - self._first_ns) * 1e-9)
+        trip = self._node.driver.core.trip if self._node.driver is not None else None
+        if trip is not None and not self._node.exit_code:
+            self._node.exit_code = TRIPPED
+            say(self._made_safe(trip), sys.stderr)
+
+    def _made_safe(self, trip: Event) -> str:
+        after = (trip.time_ns - self._first_ns) * 1e-9
+        return f"valves were made safe {after:.3f} s after arming: {trip.message}"
 
     def _look(self) -> None:
         node, state = self._node, self._node.state_label
@@ -88,8 +98,7 @@ class SessionCourse:
         if node.state_label == "active":
             node.trigger_deactivate()
         elif trip is not None:
-            after = (trip.time_ns - self._first_ns) * 1e-9
-            self._end(TRIPPED, f"valves were made safe {after:.3f} s after arming: {trip.message}")
+            self._end(TRIPPED, self._made_safe(trip))
         self._over = True
         node.event(OK, "session_complete", "the session's duration has passed")
         node.stop.set = True

@@ -82,10 +82,10 @@ class NodeProcess:
     said: list[str] = field(default_factory=list)
 
     def last_words(self) -> str:
-        """The last line it printed; one of its logger only if there is no other."""
+        """The last line it printed; what its logger says is of the way, not of the end."""
         lines = [line for line in self.said if line.strip() and not line.startswith(PROGRESS)]
         plain = [line for line in lines if not LOGGED.match(line)]
-        return (plain or lines)[-1].strip() if lines else ""
+        return plain[-1].strip() if plain else ""
 
 
 def write_parameters(values: Mapping[str, Mapping[str, Value]], folder: Path) -> Path:
@@ -209,6 +209,11 @@ class Supervisor:
             for node in group:
                 _wait_or_kill(node, end)
         self._hear()
+
+    def failure_of_lead(self) -> str:
+        """What the lead had to say if it did not end well when it was stopped, else ''."""
+        code = self.lead.process.poll() if self.lead.process is not None else None
+        return describe_end(self.lead, code) if code else ""
 
     def _listen(self, node: NodeProcess, stream: IO[str]) -> None:
         for line in stream:
