@@ -29,7 +29,7 @@ PROCESSES = ("supervisor", "road_profile", "rig", "estimator", "controller", "se
 MODES = ("sim", "emulator")
 GROWN = 400_000  # bytes of log after which the session is under way
 PATIENCE = 90.0  # s for a start or an end on a loaded computer
-AFTER = 2.0  # s a session may go on after a signal before it is ended by Ctrl-C
+AFTER = 5.0  # s a session may go on after a signal before it is ended by Ctrl-C
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ class Bench:
     executors: list[SingleThreadedExecutor] = field(default_factory=list)
 
     def start(self, domain: int | None = None) -> DaqNode:
-        """The node, as after a restart."""
+        """The node, as after a restart; the others end as well."""
         self.stop()
         self.domain = self.domain if domain is None else domain
         context = self._context()
