@@ -35,7 +35,7 @@ from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, TOPICS, Topic
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
-from pneumo_ros.nodes.sources import SoleSource
+from pneumo_ros.nodes.sources import NAMING, SoleSource
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR, noted_failure
 from pneumo_ros.session.timing import LoopTiming
@@ -203,6 +203,7 @@ class RigNode(Node):
     def on_other_publisher(self, source: SoleSource, text: str) -> None:
         """Somebody else publishes what this node takes from one publisher; nothing more of it is used."""
         source.mute()
+        text = source.too_many(NAMING) if source.count > 1 else text
         self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
 
     def _on_stranger(self, text: str) -> None:

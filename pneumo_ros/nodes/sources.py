@@ -7,6 +7,7 @@ known in time: whatever it sends is never used.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from pneumo_ros.log.topics import Topic
 
+NAMELESS = "a node without a name yet"
+NAMING = 0.3  # s a node may take to announce its name after its publisher
 UNKNOWN = "_UNKNOWN_"  # part of rmw's name of a node that has announced its publisher but not yet itself
 
 
@@ -27,7 +30,7 @@ def gid_of(info: TopicEndpointInfo) -> str:
 def node_of(info: TopicEndpointInfo) -> str:
     """Full name of an endpoint's node."""
     if UNKNOWN in info.node_name + info.node_namespace:
-        return "a node without a name yet"
+        return NAMELESS
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
@@ -70,11 +73,20 @@ class SoleSource:
         """Publishers there are: identifier -> node."""
         return {gid_of(i): node_of(i) for i in self._node.get_publishers_info_by_topic(self.topic.relative)}
 
+    def too_many(self, patience: float = 0.0) -> str:
+        """Who publishes the topic, in a sentence; with ``patience``, s, until all have a name."""
+        end = time.monotonic() + patience
+        while True:
+            nodes = ", ".join(self._label(gid, node) for gid, node in self.publishers().items())
+            if NAMELESS not in nodes or time.monotonic() >= end:
+                return f"{self.count} nodes publish {self._name()}: {nodes}"
+            time.sleep(NAMING / 20)
+
     def _on_matched(self, change: Any) -> None:
         there = self.publishers()
         self.count = change.current_count
         if self.count > 1:
-            self._on_other(self, f"{self.count} nodes publish {self._name()}: {self._others(there)}")
+            self._on_other(self, self.too_many())
         elif self.count == 1 and len(there) == 1:
             self._bind(*there.popitem())
 
@@ -94,8 +106,8 @@ class SoleSource:
     def _name(self) -> str:
         return str(self._node.resolve_topic_name(self.topic.relative))
 
-    def _others(self, there: dict[str, str]) -> str:
-        return ", ".join(f"{node} ({'this session' if gid == self.bound else gid})" for gid, node in there.items())
+    def _label(self, gid: str, node: str) -> str:
+        return f"{node} (heard until now)" if gid == self.bound else f"{node} ({gid})"
 
 
 def _forget(data: bytes) -> None:

@@ -111,7 +111,7 @@ def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_us
             publisher.publish(message)
             time.sleep(0.001)
     said, _ = process.communicate(timeout=60)
-    assert process.returncode == 1 and "2 nodes publish /valve/command" in said, said
+    assert process.returncode == 1 and "2 nodes publish /valve/command" in said and "/intruder" in said, said
     log = read_log(path)
     assert ending(log)["complete"] == "false" and "/valve/command" in ending(log)["reason"]
     same_as_alone(alone, log, whole=False)
