@@ -169,6 +169,8 @@ class DaqNode(LifecycleNodeMixin, RigNode):
 
     def on_stop(self, executor: Executor) -> None:
         """Valves safe and port closed before the last messages are delivered."""
+        if self.driver is not None:
+            self.driver.disarm()
         self.course.tell_end()
         self.on_cleanup(LifecycleState("", 0))
         super().on_stop(executor)

@@ -13,7 +13,8 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool
@@ -38,15 +39,15 @@ class Bench:
     domain: int
     node: DaqNode | None = None
     contexts: list[Context] = field(default_factory=list)
-    executors: list[SingleThreadedExecutor] = field(default_factory=list)
+    executors: list[Executor] = field(default_factory=list)
 
     def start(self, domain: int | None = None) -> DaqNode:
         """The node, as after a restart; the others end as well."""
         self.stop()
         self.domain = self.domain if domain is None else domain
-        context = self._context()
+        context = self.context()
         self.node = DaqNode(context, {**DAQ, "port": str(self.link)})
-        self._spin_with(context, self.node)
+        self.spin_with(EventsExecutor(context=context), self.node)
         return self.node
 
     def stop(self) -> None:
@@ -60,19 +61,19 @@ class Bench:
 
     def other(self) -> Any:
         """A node of somebody else."""
-        context = self._context()
+        context = self.context()
         made = rclpy.create_node("panel", context=context)
-        self._spin_with(context, made)
+        self.spin_with(SingleThreadedExecutor(context=context), made)
         return made
 
-    def _context(self) -> Context:
+    def context(self) -> Context:
         context = Context()
         rclpy.init(context=context, domain_id=self.domain)
         self.contexts.append(context)
         return context
 
-    def _spin_with(self, context: Context, node: Any) -> None:
-        executor = SingleThreadedExecutor(context=context)
+    def spin_with(self, executor: Executor, node: Any) -> None:
+        """The node under test runs on the executor that its program takes."""
         executor.add_node(node)
         self.executors.append(executor)
 

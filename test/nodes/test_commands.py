@@ -20,7 +20,7 @@ from pneumo_ros.log.topics import COMMAND
 
 OPEN = [5e-6, 5e-6, 0.0, 0.0]  # m2
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.slow]
 
 
 @pytest.fixture

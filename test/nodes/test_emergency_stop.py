@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip("rclpy")
 from helpers import sessions
 from helpers.daq_bench import DAQ, ORDINARY, Bench, emulator
+from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
@@ -21,6 +22,7 @@ from pneumo_ros.nodes.daq import DaqNode
 from pneumo_ros.nodes.dashboard_link import LiveLink
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE, TRIP_SERVICE
 
+pytestmark = pytest.mark.slow
 QOS = {
     f"{reliability.name.lower()}, {durability.name.lower()}": QoSProfile(
         depth=1, reliability=reliability, durability=durability
@@ -72,9 +74,9 @@ def test_unconfigured_stop_by_service(bench: Bench) -> None:
 def test_a_panel_that_pressed_before_the_node_came_is_heard(bench: Bench) -> None:
     panel = bench.other().create_publisher(Bool, "/rig/estop", QOS["reliable, transient_local"])
     panel.publish(Bool(data=True))
-    context = bench._context()
+    context = bench.context()
     node = bench.node = DaqNode(context, {**DAQ, "port": str(bench.link)})
-    bench._spin_with(context, node)
+    bench.spin_with(EventsExecutor(context=context), node)
     bench.until(lambda: node.operator.latch.found(), "the latch")
 
 
@@ -127,7 +129,6 @@ def test_released_twice(bench: Bench) -> None:
 # -- reconnecting ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_stop_while_the_line_is_down(tmp_path: Path) -> None:
     with emulator(tmp_path) as (link, start, stop):
         bench = Bench(link, sessions.own_domain())

@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from pneumo_ros.log import topics
 from pneumo_ros.log.reading import Log, read_log
 from pneumo_ros.nodes.neighbours import neighbours
+from pneumo_ros.session.claim import Claim
 
 SHORT = ("--duration", "2", "--seed", "5", "--no-picture", "--no-report")
 ENDLESS = ("--duration", "0", "--seed", "5", "--no-picture", "--no-report")
@@ -126,6 +127,20 @@ def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_p
         said, _ = process.communicate(timeout=60)
     assert process.returncode == 2 and "/intruder publishes /rig1/rig/displacement" in said
     assert not list(tmp_path.glob("x.mcap*"))
+
+
+@pytest.mark.parametrize("there", ["sim, a.mcap", "serial, a.mcap"])
+@pytest.mark.parametrize("options", [(), ("--source", "serial", "--port", "/dev/null")], ids=["sim", "serial"])
+def test_neither_kind_of_session_starts_beside_the_other(tmp_path: Path, there: str, options: tuple[str, ...]) -> None:
+    domain = sessions.own_domain()
+    claim = Claim(domain, "", there)
+    try:
+        process = sessions.start(*SHORT, *options, "--output", str(tmp_path / "x.mcap"), domain=domain)
+        said, _ = process.communicate(timeout=60)
+    finally:
+        claim.release()
+    assert process.returncode == 2 and f"domain {domain}: a session runs here already ({there}, process " in said
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
