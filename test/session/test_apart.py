@@ -72,14 +72,14 @@ def test_two_rigs_in_namespaces_of_one_domain_and_a_third_that_is_refused(tmp_pa
     for name, process in started.items():
         sessions.wait_for(process, tmp_path / f"{name}.mcap.part", 300_000)
     third = sessions.start(*SHORT, "--namespace", "rig1", "--output", str(tmp_path / "third.mcap"), domain=domain)
-    said, _ = third.communicate(timeout=60)
+    said, _ = third.communicate(timeout=180)
     assert third.returncode == 2 and "a session runs here already (sim, " in said and "--isolate" in said
     assert not (tmp_path / "third.mcap").exists() and len(said.strip().splitlines()) == 1
     started["rig1"].send_signal(2)
-    assert "stopped by the user; the log is finished" in started["rig1"].communicate(timeout=60)[0]
+    assert "stopped by the user; the log is finished" in started["rig1"].communicate(timeout=180)[0]
     assert started["rig2"].poll() is None, "one stops, the other goes on"
     started["rig2"].send_signal(2)
-    started["rig2"].communicate(timeout=60)
+    started["rig2"].communicate(timeout=180)
     for name, process in started.items():
         log = read_log(tmp_path / f"{name}.mcap")
         assert process.returncode == 0 and ending(log) == {"complete": "true", "reason": ""}
@@ -93,7 +93,7 @@ def test_simulations_isolate_themselves_and_log_what_they_log_alone(tmp_path: Pa
         for i in range(3)
     ]
     for number, process in enumerate(started):
-        said, _ = process.communicate(timeout=120)
+        said, _ = process.communicate(timeout=240)
         assert process.returncode == 0, said
         same_as_alone(alone, read_log(tmp_path / f"{number}.mcap"), whole=True)
 
@@ -111,7 +111,7 @@ def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_us
         while process.poll() is None:
             publisher.publish(message)
             time.sleep(0.001)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=180)
     assert process.returncode == 1 and "2 nodes publish /valve/command" in said and "/intruder" in said, said
     log = read_log(path)
     assert ending(log)["complete"] == "false" and "/valve/command" in ending(log)["reason"]
@@ -124,7 +124,7 @@ def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_p
         assert neighbours(domain, "") == []
         assert neighbours(domain, "/rig1") == ["/intruder publishes /rig1/rig/displacement"]
         process = sessions.start(*SHORT, "--namespace", "rig1", "--output", str(tmp_path / "x.mcap"), domain=domain)
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=180)
     assert process.returncode == 2 and "/intruder publishes /rig1/rig/displacement" in said
     assert not list(tmp_path.glob("x.mcap*"))
 
@@ -136,7 +136,7 @@ def test_neither_kind_of_session_starts_beside_the_other(tmp_path: Path, there: 
     claim = Claim(domain, "", there)
     try:
         process = sessions.start(*SHORT, *options, "--output", str(tmp_path / "x.mcap"), domain=domain)
-        said, _ = process.communicate(timeout=60)
+        said, _ = process.communicate(timeout=180)
     finally:
         claim.release()
     assert process.returncode == 2 and f"domain {domain}: a session runs here already ({there}, process " in said
@@ -149,5 +149,5 @@ def test_neither_kind_of_session_starts_beside_the_other(tmp_path: Path, there: 
 )
 def test_bad_places_are_named(tmp_path: Path, options: tuple[str, ...], word: str) -> None:
     process = sessions.start(*SHORT, *options, "--output", str(tmp_path / "x.mcap"), domain=-1)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=180)
     assert process.returncode == 2 and word in said
