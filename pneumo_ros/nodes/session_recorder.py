@@ -23,7 +23,7 @@ from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.course import RIG_NODES, Course
+from pneumo_ros.session.ending import RIG_NODES, Ending
 from pneumo_ros.session.supervisor import noted_failure
 
 DRAIN_LIMIT = 5.0  # s
@@ -44,7 +44,7 @@ class SessionRecorderNode(RigNode):
         self.writer = LogWriter(Path(self.values["output"]), self._metadata())
         self.written: Written | None = None
         self._warned = False
-        self.course = Course()
+        self.ending = Ending()
         for topic in (*(t for t in TOPICS if t.recorded), PARAMETER_EVENTS):
             self._record(topic)
         self.steady_timer(WATCH_PERIOD, self._watch)
@@ -97,7 +97,7 @@ class SessionRecorderNode(RigNode):
         def taken(data: bytes) -> None:
             take(data)
             for status in deserialize_message(data, DiagnosticArray).status:
-                self.course.hear(status.level == ERROR, {v.key: v.value for v in status.values}, status.message)
+                self.ending.hear(status.level == ERROR, {v.key: v.value for v in status.values}, status.message)
 
         return taken
 
@@ -129,7 +129,7 @@ class SessionRecorderNode(RigNode):
             self._watch()
             self.stop.set = True
         reason = self.stop.reason if self.stop.failed else ""
-        complete, why = self.course.verdict(RIG_NODES & self.session_nodes, noted_failure() or reason)
+        complete, why = self.ending.verdict(RIG_NODES & self.session_nodes, noted_failure() or reason)
         self.written = self.writer.finish(complete, why)
 
     def drain(self, executor: Executor) -> None:

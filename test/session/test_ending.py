@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pneumo_ros.session.course import Course
+from pneumo_ros.session.ending import Ending
 
 RIG = frozenset({"plant"})
 STARTED, OVER = ("session_started", "first sample"), ("session_complete", "the duration has passed")
@@ -26,7 +26,7 @@ CUT, TRIP = ("session_stopped", "cut short after 1.000 s of 20 s"), ("!sensor_ra
     ],
 )
 def test_verdict(heard: list[tuple[str, str]], rigs: frozenset[str], failure: str, complete: bool, reason: str) -> None:
-    course = Course()
+    ending = Ending()
     for code, message in heard:
-        course.hear(code.startswith("!"), {"code": code.lstrip("!")}, message)
-    assert course.verdict(rigs, failure) == (complete, reason)
+        ending.hear(code.startswith("!"), {"code": code.lstrip("!")}, message)
+    assert ending.verdict(rigs, failure) == (complete, reason)

@@ -8,7 +8,7 @@ RIG_NODES = frozenset(("plant", "daq"))
 """Nodes of which a session has one; it says when the session begins and when it is over."""
 
 
-class Course:
+class Ending:
     """Listens to the events of a session."""
 
     def __init__(self) -> None:
