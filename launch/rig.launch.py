@@ -86,7 +86,7 @@ def nodes(context: LaunchContext) -> list[object]:
         )
         for name in names
     }  # fmt: skip
-    ends = End(source, log, reason)
+    ends = End(log, reason)
     watch = [
         RegisterEventHandler(OnProcessExit(target_action=node, on_exit=ends.handler(name)))
         for name, node in made.items()
@@ -100,13 +100,12 @@ class End:
 
     Parameters
     ----------
-    source : node whose end with exit code 0 is the session's
     log : that the recorder writes
     reason : file from which the recorder learns why the session failed
     """
 
-    def __init__(self, source: str, log: Path, reason: Path) -> None:
-        self._source, self._log, self._reason = source, log, reason
+    def __init__(self, log: Path, reason: Path) -> None:
+        self._log, self._reason = log, reason
 
     def handler(self, name: str) -> object:
         """What to do when the node ``name`` has ended."""
@@ -120,7 +119,7 @@ class End:
         return on_exit
 
     def _end(self, name: str, code: int) -> list[object]:
-        if name == self._source and code == 0:
+        if code == 0:  # the rig's node is done, or the user asked this one to end before launch heard of it
             return [EmitEvent(event=Shutdown(reason="session ended"))]
         how = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         why = f"node {name} {how}"

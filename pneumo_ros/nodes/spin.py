@@ -25,6 +25,7 @@ from pneumo_ros.session.supervisor import SUPERVISOR
 SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
 TICK_TIMEOUT = 2.0  # s within which a timer must tick on a working executor
 BAD_INPUT = 2
+ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 PR_SET_PDEATHSIG = 1  # of Linux's prctl
 
 
@@ -33,7 +34,7 @@ class SignalStop(StopRequest):
 
     def __init__(self) -> None:
         super().__init__()
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in ASKING:
             signal.signal(number, self._on_signal)
         end_with_supervisor()
 
@@ -43,6 +44,15 @@ class SignalStop(StopRequest):
             why = "the session's supervisor was killed" if alone else f"stopped by {signal.Signals(number).name}"
             self.failed, self.reason = True, why
         self.set = True
+
+
+def ask_no_more() -> None:
+    """Everything is done: who asks again must not turn an orderly end into a killed process.
+
+    Python hands signals back to the kernel's default, which kills, while the interpreter ends; ignored ones stay so.
+    """
+    for number in ASKING:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def end_with_supervisor() -> None:
@@ -119,5 +129,6 @@ def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> in
         )
         code = BAD_INPUT
     finally:
+        ask_no_more()
         rclpy.try_shutdown()
     return code
