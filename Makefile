@@ -19,7 +19,7 @@ $(READY): requirements.lock setup.py package.xml
 	@touch $@
 
 demo: $(READY)  ## A 20 s closed-loop session on a class D road: log, summary, picture
-	$(BIN)/pneumo run --road D --duration 20
+	$(BIN)/pneumo run --isolate --road D --duration 20
 
 test: lint types unit  ## Lint, types and every test
 

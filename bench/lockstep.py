@@ -20,7 +20,7 @@ def speed(folder: Path, duration: float, single: bool) -> float:
     log = folder / f"session-{len(list(folder.iterdir()))}.mcap"
     options = ["--single-process"] if single else []
     subprocess.run(
-        [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--duration", str(duration), "--no-picture",
+        [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--isolate", "--duration", str(duration), "--no-picture",
          "--output", str(log), *options],
         check=True, stdout=subprocess.DEVNULL,
     )  # fmt: skip

@@ -35,6 +35,7 @@ def keys(tree: ast.expr) -> dict[str, ast.expr]:
 
 SOURCES: dict[str, str] = ast.literal_eval(assigned("SOURCES"))
 ARGUMENTS: dict[str, tuple[str, str]] = ast.literal_eval(assigned("ARGUMENTS"))
+CHOICES = keys(assigned("CHOICES"))
 
 
 def nodes_of(source: str) -> list[str]:
@@ -61,12 +62,16 @@ def test_every_parameter_is_declared_by_its_node(source: str) -> None:
     assert set(own) <= set(declared)
     for node in nodes_of(source):
         given = set(common) | (set(keys(own[node])) if node in own else set())
-        assert given <= declared[node], node
+        assert given <= declared[node] | {"use_sim_time"}, node  # every node of ROS 2 has that one
 
 
 def test_arguments_are_described_and_their_defaults_fit() -> None:
     assert ARGUMENTS["source"][0] in SOURCES
     assert all(text for _, text in ARGUMENTS.values())
+    assert set(CHOICES) <= set(ARGUMENTS)
+    assert {"namespace", "params_file", "log_folder", "use_sim_time"} <= set(ARGUMENTS)
+    for name in ("mode", "use_sim_time"):
+        assert ARGUMENTS[name][0] in ast.literal_eval(CHOICES[name])
     used = {ast.literal_eval(node.slice) for node in ast.walk(TREE) if isinstance(node, ast.Subscript)
             and isinstance(node.value, ast.Name) and node.value.id == "given"}  # fmt: skip
     assert used == set(ARGUMENTS)
@@ -78,7 +83,9 @@ def test_the_default_parameter_file_holds_declared_parameters() -> None:
     declared = {node: {p.name for p in table} for node, table in tables.items()}
     everywhere = set.intersection(*declared.values())
     for node, content in yaml.safe_load((ROOT / "config" / "session.yaml").read_text(encoding="utf-8")).items():
-        assert set(content["ros__parameters"]) <= (everywhere if node == "/**" else declared[node]), node
+        bare = node.rpartition("/")[2]
+        assert node.startswith("/**"), "a key without it holds in no namespace"
+        assert set(content["ros__parameters"]) <= (everywhere if bare == "**" else declared[bare]), node
 
 
 def test_what_it_imports_is_a_dependency_of_the_package() -> None:

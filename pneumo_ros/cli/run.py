@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import signal
-from contextlib import nullcontext
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from pneumo_ros.cli.app import App
 from pneumo_ros.cli.choices import ALIASES, DEFAULT_CONTROLLER, ROAD_CLASSES, check_controller, check_road
@@ -21,7 +26,9 @@ from pneumo_ros.errors import InputError, not_one_of
 if TYPE_CHECKING:
     from pneumo_ros.parameters import Value
     from pneumo_ros.rig import Rig
+    from pneumo_ros.session.claim import Claim
     from pneumo_ros.session.plan import Tables, Values
+    from pneumo_ros.session.supervisor import Place
 
 app = App(add_completion=False)
 FAILED = 1
@@ -66,9 +73,22 @@ def run(
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
     output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
-    domain_id: Annotated[
-        int | None, typer.Option(help="DDS domain; the environment's by default.", min=0, max=232)
+    domain: Annotated[
+        int | None,
+        typer.Option(
+            "--domain",
+            "--domain-id",
+            help="DDS domain, where no other session may be; the environment's by default.",
+            min=0,
+            max=232,
+        ),
     ] = None,
+    isolate: Annotated[bool, typer.Option("--isolate", help="Take a free DDS domain.")] = False,
+    namespace: Annotated[str, typer.Option(help="ROS namespace of nodes and topics, one for each rig: rig1.")] = "",
+    use_sim_time: Annotated[
+        bool, typer.Option("--use-sim-time", help="Nodes that do not give the samples their time follow /clock.")
+    ] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Print what the nodes say.")] = False,
     view: Annotated[
         bool, typer.Option("--view", help="Show it in the browser while it runs, in real time; see pneumo view.")
     ] = False,
@@ -82,7 +102,12 @@ def run(
         raise not_one_of("unknown source", source, RIG_NODES, where="--source")
     from pneumo_ros.cli.view import beside
     from pneumo_ros.session.plan import assign, parse_setting, read_config
+    from pneumo_ros.session.supervisor import Place
 
+    if isolate and domain is not None:
+        raise InputError("either a domain or any free one", where="--isolate", key="--domain", value=domain,
+                         remedy="leave one of them out")  # fmt: skip
+    place = _namespace(namespace)
     tables = node_tables()
     values = read_config(config, tables) if config else {node: {} for node in tables}
     if valves is not None:
@@ -107,12 +132,41 @@ def run(
     tell_assumed(console, checked, rig)
     if checked.effects:
         _tell_effects(console, checked, source)
-    with beside(domain_id) if view else nullcontext() as dashboard:
-        _run_session(console, values, target, single_process, domain_id)
-        _report(console, target, values, picture, report)
-        if dashboard is not None:
-            console.print("the dashboard stays until Ctrl-C")
-            dashboard.wait()
+    if use_sim_time:
+        for own in values.values():
+            own["use_sim_time"] = True
+    with _alone(domain, place, isolate, f"{source}, {target}") as claim:
+        if isolate:
+            console.print(f"isolated in domain {claim.domain}")
+        with beside(claim.domain, place) if view else nullcontext() as dashboard:
+            there = Place(claim.domain, place, (claim.descriptor,))
+            _run_session(console, values, target, single_process, there, verbose)
+            _report_unless_asked_to_end(console, target, values, picture, report)
+            if dashboard is not None:
+                console.print("the dashboard stays until Ctrl-C")
+                dashboard.wait()
+
+
+def _namespace(text: str) -> str:
+    """'' or /name[/name...], from what the user wrote."""
+    bare = text.strip("/")
+    if bare and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*", bare):
+        raise InputError("not a ROS namespace", where="--namespace", value=text, allowed="letters, digits, _ and /")
+    return f"/{bare}" if bare else ""
+
+
+@contextmanager
+def _alone(domain: int | None, namespace: str, isolate: bool, what: str) -> Iterator[Claim]:
+    """A place in the ROS graph where no other session is; nothing is started before that is known."""
+    from pneumo_ros.nodes.neighbours import claim_place
+
+    # A session stays on this computer unless the user opened it to the network.
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    claim = claim_place(domain, namespace, isolate, what)
+    try:
+        yield claim
+    finally:
+        claim.release()
 
 
 def _player(controller: str) -> str:
@@ -151,6 +205,8 @@ def _options(
     road: str, duration: float, speed: float, controller: str, seed: int, rate: float, realtime: bool, source: str
 ) -> list[tuple[str, str, Any]]:
     """The command line's options as settings of nodes."""
+    from pneumo_ros.control.presets import controller_settings
+
     return [
         *_road_options(road),
         ("road_profile", "speed_kmh", speed),
@@ -159,23 +215,9 @@ def _options(
         ("**", "session_nodes", ",".join(session_nodes(source))),
         (RIG_NODES[source], "duration", duration),
         (RIG_NODES[source], "report_progress", True),
-        *_controller_options(ALIASES.get(controller, controller)),
+        *controller_settings(ALIASES.get(controller, controller)),
         ("**", "rate_hz", rate),
         ("**", "mode", "realtime" if realtime or source == "serial" else "lockstep"),
-    ]
-
-
-def _controller_options(name: str) -> list[tuple[str, str, Any]]:
-    """A preset's values for estimator and controller, or a member of the controller family with its defaults."""
-    from pneumo_ros.control.presets import PRESETS
-
-    if name not in PRESETS:
-        return [("controller", "controller", name)]
-    preset = PRESETS[name]
-    own = {"controller": "first_order_smflc", **preset.controller}
-    return [
-        *(("estimator", key, value) for key, value in preset.estimator.items()),
-        *(("controller", key, value) for key, value in own.items()),
     ]
 
 
@@ -192,7 +234,12 @@ def _finish_plan(values: Values, rig: Path | None, target: Path, session: dict[s
         if rig is not None:
             own["rig"] = str(rig.resolve())
     values["session_recorder"]["output"] = str(target)
-    values["session_recorder"]["session"] = json.dumps({**session, "parameters": json.dumps(values)})
+    identity = uuid.uuid4().hex
+    values["session_recorder"]["session"] = json.dumps(
+        {**session, "session_id": identity, "parameters": json.dumps(values)}
+    )
+    for own in values.values():
+        own["session_id"] = identity
 
 
 def _tell_effects(console: Console, rig: Rig, source: str) -> None:
@@ -286,10 +333,12 @@ def _tell_doubts(console: Console, name: str) -> None:
         )
 
 
-def _run_session(console: Console, values: Values, target: Path, single_process: bool, domain_id: int | None) -> None:
+def _run_session(
+    console: Console, values: Values, target: Path, single_process: bool, place: Place, verbose: bool
+) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from pneumo_ros.session.supervisor import NodeProcess, SessionError, Supervisor
+    from pneumo_ros.session.supervisor import NodeProcess, SessionError, StopAsked, Supervisor
 
     rig_node = "daq" if "daq" in values else "plant"
     names = ("single_process",) if single_process else session_nodes("serial" if rig_node == "daq" else "sim")
@@ -305,35 +354,51 @@ def _run_session(console: Console, values: Values, target: Path, single_process:
     length = float(values[rig_node]["duration"])
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("session", total=length or None, length=f"{length:g} s" if length else "any")
-        for number in (signal.SIGINT, signal.SIGTERM):  # set both: a background job inherits an ignored SIGINT
-            signal.signal(number, signal.default_int_handler)  # either ends the session in order
-        supervisor = Supervisor(nodes, values, lead, domain_id, lambda t: progress.update(task, completed=t))
+        show = (lambda node, line: console.print(f"{node}: {line}", markup=False)) if verbose else (lambda _, __: None)
+        supervisor = Supervisor(nodes, values, lead, place, lambda t: progress.update(task, completed=t), show)
         try:
             with supervisor:
                 supervisor.wait()
         except SessionError as error:
             progress.stop()
-            Console(stderr=True, highlight=False, soft_wrap=True).print(f"[red]session failed:[/red] {error}")
+            Console(stderr=True, highlight=False, soft_wrap=True).print(
+                f"[red]session failed:[/red] {escape(str(error))}"
+            )
             _save_what_is_left(target)
             raise typer.Exit(FAILED) from error
-        except KeyboardInterrupt:
+        except StopAsked as asked:
             progress.stop()
-            _tell_stopped(console, target)
+            _tell_stopped(console, target, str(asked), supervisor.failure_of_lead())
 
 
-def _tell_stopped(console: Console, target: Path) -> None:
-    """What became of the log when the user ended the session; an end before the first sample leaves none."""
+def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None:
+    """One sentence that is true: with a log or without one, after a trip or without."""
     from pneumo_ros.log import topics
     from pneumo_ros.log.reading import read_log
 
+    if failure:
+        console.print(f"stopped by {by}, after this: {failure}", markup=False, soft_wrap=True)
+        _save_what_is_left(target)
+        raise typer.Exit(FAILED)
     if not target.exists():
-        console.print("stopped by the user before the session began: there is no log")
+        console.print(f"stopped by {by} before there was anything to log")
         raise typer.Exit(INTERRUPTED)
     found = read_log(target, [topics.DISPLACEMENT.name]).topics.get(topics.DISPLACEMENT.name)
     if found is None or found.count < MIN_SAMPLES:
-        console.print(f"stopped by the user before there was anything to show; the log holds the start: {target}")
-        raise typer.Exit(INTERRUPTED)
-    console.print("stopped by the user; the log is finished")
+        console.print(f"stopped by {by} before there was anything to show; the log holds the start: {target}")
+        raise typer.Exit
+    console.print(f"stopped by {by}; the log is finished")
+
+
+def _report_unless_asked_to_end(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+    """The session and its log are done; who asks again to end gets no report."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        _report(console, target, values, picture, page)
+    except KeyboardInterrupt:
+        console.print(f"no report was made; log {target}")
+        raise typer.Exit from None
 
 
 def _save_what_is_left(target: Path) -> None:

@@ -41,15 +41,19 @@ def view(
     port: Port = 0,
     token: Token = None,
     domain_id: Annotated[
-        int | None, typer.Option(help="DDS domain of the running session; the environment's by default.")
+        int | None,
+        typer.Option(
+            "--domain", "--domain-id", help="DDS domain of the running session; the environment's by default."
+        ),
     ] = None,
+    namespace: Annotated[str, typer.Option(help="ROS namespace of the running session.")] = "",
 ) -> None:
     """Serve the dashboard and print its address; Ctrl-C ends it."""
     _need_bokeh()
     if log is not None:
         view_log(log, host, port, token, other)
     else:
-        view_live(host, port, token, domain_id)
+        view_live(host, port, token, domain_id, namespace)
 
 
 def view_log(path: Path, host: str, port: int, token: str | None, other: Path | None = None) -> None:
@@ -74,24 +78,25 @@ def view_log(path: Path, host: str, port: int, token: str | None, other: Path | 
     dashboard.run()
 
 
-def view_live(host: str, port: int, token: str | None, domain_id: int | None) -> None:
+def view_live(host: str, port: int, token: str | None, domain_id: int | None, namespace: str = "") -> None:
     """Show the session that runs on a DDS domain, with its gains and the emergency stop."""
     from pneumo_ros.dashboard.page import Page
     from pneumo_ros.dashboard.server import serve
     from pneumo_ros.nodes.dashboard_link import LiveLink
 
     os.nice(NICE)
-    with LiveLink(domain_id) as link:
+    with LiveLink(domain_id, namespace) as link:
         dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)
         console.print(f"dashboard at {dashboard.url}  (Ctrl-C ends it)", highlight=False, soft_wrap=True)
         dashboard.run()
 
 
 @contextmanager
-def beside(domain_id: int | None) -> Iterator[Viewer]:
+def beside(domain_id: int | None, namespace: str = "") -> Iterator[Viewer]:
     """The live dashboard in a process of its own, so that drawing never holds up a node; ended on leaving."""
     _need_bokeh()
     domain = ["--domain-id", str(domain_id)] if domain_id is not None else []
+    domain += ["--namespace", namespace] if namespace else []
     environment = {**os.environ}
     environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     process = subprocess.Popen(

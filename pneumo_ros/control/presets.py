@@ -46,3 +46,16 @@ PRESETS: dict[str, Preset] = {
         },
     ),
 }
+
+
+def controller_settings(name: str) -> list[tuple[str, str, Value]]:
+    """(node, parameter, value) of a preset, for estimator and controller; any other name is a member of the controller
+    family with its defaults."""
+    if name not in PRESETS:
+        return [("controller", "controller", name)]
+    preset = PRESETS[name]
+    own = {"controller": "first_order_smflc", **preset.controller}
+    return [
+        *(("estimator", key, value) for key, value in preset.estimator.items()),
+        *(("controller", key, value) for key, value in own.items()),
+    ]

@@ -378,6 +378,10 @@ class DriverCore:
             self.actuation.reset_estop(now)
         return why
 
+    def refuse(self, reason: Reason, why: str, now: int) -> None:
+        """Something outside of link and board makes driving unsafe: a trip if armed, else an event."""
+        self._lose(Finding(reason, "command", why), now)
+
     def fail(self, why: str, now: int) -> None:
         """Something in the driver itself broke: valves safe, whatever else still works."""
         self._make_safe(Finding(Reason.DRIVER_FAILED, "driver", why), now)

@@ -128,6 +128,10 @@ class SerialDriver:
         """Emergency stop, latched."""
         self._do(lambda now: self.core.estop(source, now))
 
+    def trip(self, reason: Reason, why: str) -> None:
+        """Valves safe because of something the driver cannot see itself."""
+        self._do(lambda now: self.core.refuse(reason, why, now))
+
     def reset(self, timeout: float = 1.0) -> list[str]:
         """Reset an emergency stop; returns why not."""
         why = self._do(self.core.reset)

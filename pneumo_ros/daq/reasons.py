@@ -36,6 +36,7 @@ class Reason(Enum):
     DISARMED = "disarmed by the operator"
     COMMAND_STALE = "no fresh command from the controller"
     COMMAND_INVALID = "a command that is not finite or outside the valves' range was refused"
+    COMMAND_FOREIGN = "somebody else than the controller publishes commands"
     LIMIT_WARN = "a quantity is outside its warning limits"
     LIMIT_CLEAR = "a quantity is back inside its warning limits"
     LIMIT_TRIP = "a quantity was outside its trip limits"

@@ -15,11 +15,14 @@ from pneumo_ros.rig.channels import CHANNELS, DISPLACEMENTS, ESTIMATE_FIELDS, RO
 class Flow(Enum):
     """Quality of service of a topic (REP 2003), with the reason."""
 
-    STREAM = "reliable, keep last 200, volatile: one sample a control period; the log must not miss one"
+    STREAM = "reliable, keep last 200 (lockstep 2000), volatile: one sample a control period; the log must not miss one"
     CLOCK = "best effort in real time, reliable in lockstep, keep last 1: only the newest time matters"
     LATCHED = "reliable, keep last 1, transient local: a late subscriber still learns it"
     EVENTS = "reliable, keep last 100, transient local: rare, each one matters, also to a late subscriber"
     STATUS = "reliable, keep last 10, volatile: periodic health, a lost one is replaced by the next"
+    STOP = (
+        "reliable, keep last 10, volatile; the valves' owner also takes best effort and transient local: any publisher"
+    )
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Topic:
 
     Attributes
     ----------
-    name : absolute name
+    name : absolute name, as in every log; nodes create it below their namespace (:attr:`relative`)
     type : ROS interface name
     meaning : what it carries, in a sentence
     publisher : node that publishes it ('' where any node may)
@@ -50,6 +53,11 @@ class Topic:
     fields: tuple[tuple[str, str], ...] = ()
     rates: bool = False
     recorded: bool = True
+
+    @property
+    def relative(self) -> str:
+        """Name that a node's namespace and remappings apply to."""
+        return self.name.lstrip("/")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -131,7 +139,7 @@ DIAGNOSTIC = Topic(
 )  # fmt: skip
 ESTOP = Topic(
     "/rig/estop", "std_msgs/msg/Bool", "emergency stop: true latches it, false does nothing; released by service only",
-    "", ("plant", "daq"), flow=Flow.EVENTS,
+    "", ("plant", "daq"), flow=Flow.STOP,
 )  # fmt: skip
 READY = Topic(
     "/rig/ready", STRING, "name of a node whose publishers have all their subscribers", "", ("plant", "daq"),

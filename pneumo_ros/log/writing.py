@@ -105,7 +105,9 @@ class LogWriter:
         self._finishing = threading.Event()
         self._lock = threading.Lock()  # topics are registered by callbacks while the thread writes
         self._total = self._latest = 0
-        self._stopped = ""
+        self._stopped = self._disorder = ""
+        self._steps: dict[int, int] = {}
+        self._stamps: dict[int, int] = {}
         self._thread = threading.Thread(target=self._drain, name="log-writer", daemon=True)
         self._thread.start()
 
@@ -114,11 +116,25 @@ class LogWriter:
         """Why nothing is written any more ('' while all is well): disk full or an error of the file system."""
         return self._stopped
 
-    def add_topic(self, topic: str, type_name: str, qos: list[dict[str, Any]] | None = None) -> Channel:
-        """Register a topic before its first message; ``qos`` as the publisher offers it, rosbag2's keys."""
+    @property
+    def disorder(self) -> str:
+        """Which topic's stamps first failed to rise as they must ('' while all do)."""
+        return self._disorder
+
+    def add_topic(
+        self, topic: str, type_name: str, qos: list[dict[str, Any]] | None = None, step_ns: int | None = None
+    ) -> Channel:
+        """Register a topic before its first message.
+
+        ``qos`` as the publisher offers it, rosbag2's keys; ``step_ns`` for messages with a header whose stamps must
+        rise: by exactly so much, or by any amount if 0 (:attr:`disorder`).
+        """
         definition, type_hash = interface(type_name)
         with self._lock:
-            return self._register(topic, type_name, definition, type_hash, qos or [])
+            channel = self._register(topic, type_name, definition, type_hash, qos or [])
+            if step_ns is not None:
+                self._steps[channel.number] = step_ns
+            return channel
 
     def _register(
         self, topic: str, type_name: str, definition: str, type_hash: str, offered: list[dict[str, Any]]
@@ -218,6 +234,8 @@ class LogWriter:
                 elif log_ns == AT_LATEST:
                     log_ns = self._latest
                 self._latest = log_ns
+                if channel.number in self._steps:
+                    self._watch_stamps(channel, stamp_of(data))
                 if self._total % DISK_CHECK_EVERY == 1:
                     self._check_disk()
                 if self._stopped:
@@ -227,6 +245,14 @@ class LogWriter:
                 except OSError as error:
                     self._stopped = f"the file system refused to write ({error})"
                     self._reserve.unlink(missing_ok=True)
+
+    def _watch_stamps(self, channel: Channel, stamp: int) -> None:
+        last, step = self._stamps.get(channel.number), self._steps[channel.number]
+        self._stamps[channel.number] = stamp
+        if last is None or (stamp == last + step if step else stamp > last) or self._disorder:
+            return
+        what = "repeats" if stamp == last else "goes back" if stamp < last else "leaves a gap"
+        self._disorder = f"the stamp of {channel.topic} {what}: {stamp} ns after {last} ns"
 
     def _check_disk(self) -> None:
         try:

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from contextlib import suppress
+from typing import Any, TextIO
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -16,6 +18,8 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import Executor
@@ -29,11 +33,13 @@ from std_msgs.msg import String
 
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, READY, SETUP, TOPICS, Topic
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, TOPICS, Topic
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
+from pneumo_ros.nodes.readiness import Readiness
+from pneumo_ros.nodes.sources import NAMING, SoleSource
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.supervisor import SUPERVISOR
+from pneumo_ros.session.supervisor import SUPERVISOR, noted_failure
 from pneumo_ros.session.timing import LoopTiming
 
 SESSION_NODES = "road_profile,plant,estimator,controller,session_recorder"
@@ -53,7 +59,13 @@ COMMON: tuple[Parameter, ...] = (
         "executor", "events", "", "events: EventsExecutor through spin_once; single: SingleThreadedExecutor",
         choices=("events", "single"), read_only=True,
     ),
+    Parameter(
+        "session_id", "", "", "identity of the session: its nodes listen to each other and to nobody else; empty for "
+        "nodes that are started by hand", read_only=True,
+    ),
 )  # fmt: skip
+FAILED = 1  # exit code of a node that ends its session because something is wrong
+SAY_AGAIN = 1.0  # s between log lines about events of one code
 ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
@@ -63,12 +75,13 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 class StopRequest:
     """Asks the spinning loop to end; shared by its nodes.
 
-    ``failed`` says that the session ended because something broke, not because it was over.
+    ``failed`` says that the session ended because something broke, not because it was over; ``reason`` what.
     """
 
     def __init__(self) -> None:
         self.set = False
         self.failed = False
+        self.reason = ""
 
 
 class RigNode(Node):
@@ -80,6 +93,7 @@ class RigNode(Node):
     table : its own parameters; :data:`COMMON` is added
     context : private context, or None for the default one
     overrides : parameter values that win over files and arguments
+    owns_time : whether samples get their time here: such a node cannot follow /clock, whatever use_sim_time says
     """
 
     def __init__(
@@ -89,13 +103,15 @@ class RigNode(Node):
         *,
         context: Context | None = None,
         overrides: Mapping[str, Value] | None = None,
+        owns_time: bool = False,
     ) -> None:
+        given = {**(overrides or {}), **({"use_sim_time": False} if owns_time else {})}
         super().__init__(
             name,
             context=context,
-            enable_rosout=False,
-            parameter_overrides=[RosParameter(key, value=value) for key, value in (overrides or {}).items()],
+            parameter_overrides=[RosParameter(key, value=value) for key, value in given.items()],
         )
+        self.role, self.owns_time = name, owns_time
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
@@ -105,14 +121,16 @@ class RigNode(Node):
         self.stop = StopRequest()
         self.exit_code = 0
         self.timing = LoopTiming()
+        self.sources: list[SoleSource] = []
         self._outgoing: list[tuple[Topic, Publisher]] = []
+        self._logged: dict[str, float] = {}
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
-        self._ready = self.publisher(READY)
-        self.ready = False
-        self._ready_timer: Timer = self.create_timer(READY_PERIOD, self._look_for_subscribers)
-        self.create_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics)
+        self.readiness = Readiness(self, name, str(self.values["session_id"]), self._on_stranger)
+        self.ready = self.begun = False
+        self._ready_timer: Timer = self.steady_timer(READY_PERIOD, self._look_for_subscribers)
+        self.steady_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics)
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._note_change)
 
@@ -135,6 +153,8 @@ class RigNode(Node):
             for change in changes:
                 if change.name in self.table:
                     self.table[change.name].checked(change.value, self.get_name())
+                elif change.name == "use_sim_time" and change.value and self.owns_time:
+                    raise InputError("the samples get their time here", where=self.get_name(), key="use_sim_time")
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -154,7 +174,7 @@ class RigNode(Node):
     def publish_setup(self) -> None:
         """Say on /rig/setup which parameters this node runs with."""
         stamp = self.get_clock().now().nanoseconds
-        text = yaml.safe_dump({"node": self.get_name(), "time_ns": stamp, "parameters": self.values}, sort_keys=False)
+        text = yaml.safe_dump({"node": self.role, "time_ns": stamp, "parameters": self.values}, sort_keys=False)
         self._setup.publish(String(data=text))
 
     # -- topics ----------------------------------------------------------------------------------------------------
@@ -175,45 +195,92 @@ class RigNode(Node):
         with refused_overrides(self.get_name(), args[1]):
             return super().create_subscription(*args, **options)
 
+    def steady_timer(self, period: float, callback: Callable[[], None]) -> Timer:
+        """A timer on a steady clock: simulated time may stand still, waiting and watching must not."""
+        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the table."""
-        made = self.create_publisher(message_class(topic.type), topic.name, publisher_qos(topic.flow, self.lockstep))
+        made = self.create_publisher(
+            message_class(topic.type), topic.relative, publisher_qos(topic.flow, self.lockstep)
+        )
         self._outgoing.append((topic, made))
         return made
 
-    def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        """Receive a topic of the table as serialised bytes."""
-        qos = subscriber_qos(topic.flow, self.lockstep)
-        self.create_subscription(message_class(topic.type), topic.name, callback, qos, raw=True)
+    def subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: QoSProfile | None = None) -> SoleSource:
+        """Receive a topic of the table, from its one publisher, as serialised bytes."""
+        source = SoleSource(self, topic, self.on_other_publisher)
+        made = self.create_subscription(
+            message_class(topic.type), topic.relative, callback, qos or subscriber_qos(topic.flow, self.lockstep),
+            event_callbacks=source.callbacks() if topic.publisher else None, raw=True,
+        )  # fmt: skip
+        source.attach(made)
+        self.sources.append(source)
+        return source
 
-    def ready_qos(self) -> QoSProfile:
-        """Of /rig/ready, for the node that waits for the others."""
-        return publisher_qos(READY.flow, self.lockstep)
+    def on_other_publisher(self, source: SoleSource, text: str) -> None:
+        """Somebody else publishes what this node takes from one publisher; nothing more of it is used."""
+        source.mute()
+        text = source.too_many(NAMING) if source.count > 1 else text
+        self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
+
+    def _on_stranger(self, text: str) -> None:
+        # A session that runs goes on: the newcomer hears of it and ends. Its publishers are another matter.
+        if not self.begun:
+            self.fail("other_session", f"{text}; end it, or use --domain N or --isolate")
 
     def expected_subscribers(self, topic: Topic) -> set[str]:
-        """Names of the session's nodes that take ``topic``."""
+        """Nodes of the session that take ``topic``."""
         takers = {*topic.subscribers, *(("session_recorder",) if topic.recorded else ())}
-        return takers & set(str(self.values["session_nodes"]).split(",")) - {self.get_name()}
+        return takers & self.session_nodes - {self.role}
+
+    @property
+    def session_nodes(self) -> set[str]:
+        """Nodes of the session, as the table of topics calls them."""
+        return set(str(self.values["session_nodes"]).split(","))
 
     def _look_for_subscribers(self) -> None:
-        for topic, made in self._outgoing:
-            wanted = self.expected_subscribers(topic)
-            there = self.get_subscriptions_info_by_topic(topic.name)
-            if not wanted <= {info.node_name for info in there} or made.get_subscription_count() < len(wanted):
-                return
-        self.ready = True
-        self._ready_timer.cancel()
-        self.publish_setup()
-        self._ready.publish(String(data=self.get_name()))
-        self.on_ready()
+        if not self.ready:
+            self._announce()
+        elif self.session_nodes <= self.readiness.ready:
+            self._ready_timer.cancel()
+            self._begin()
 
-    def on_ready(self) -> None:
-        """Called once, when every publisher has its subscribers."""
+    def _announce(self) -> None:
+        outgoing = [topic for topic, _ in self._outgoing]
+        if not self.readiness.announce(outgoing, [source.topic for source in self.sources]):
+            return
+        if all(self.readiness.connected(t, made, self.expected_subscribers(t)) for t, made in self._outgoing):
+            self.ready = True
+            self.publish_setup()
+            self.readiness.announce_ready()
+
+    def _begin(self) -> None:
+        """Every node is ready: from here on each topic belongs to the publisher that this session announced."""
+        self.begun = True
+        for source in self.sources:
+            if source.topic.publisher:
+                source.held = bool(self.values["session_id"])
+                source.refuse_stranger(self.readiness.publishers(source.topic))
+        if not self.stop.set:
+            self.on_begin()
+
+    def on_begin(self) -> None:
+        """Called once, when every node of the session is ready."""
 
     def on_stop(self, executor: Executor) -> None:
         """Called when the session ends, after the last callback; what was published is delivered first."""
         for _, made in self._outgoing:
             made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
+
+    def fail(self, code: str, text: str) -> None:
+        """End the session because of ``text``; said once."""
+        if self.stop.set:
+            return
+        self.event(ERROR, code, text)
+        say(f"error: {text}", sys.stderr)
+        self.exit_code, self.stop.reason = FAILED, text
+        self.stop.failed = self.stop.set = True
 
     # -- health ----------------------------------------------------------------------------------------------------
 
@@ -238,17 +305,33 @@ class RigNode(Node):
     def _publish_diagnostics(self) -> None:
         self._end_if_alone()
         level, message = self.health_level()
-        self._diagnostics.publish(self._array(level, f"{self.get_name()}: loop", message, self.health()))
+        self._diagnostics.publish(self._array(level, f"{self.role}: loop", message, self.health()))
 
     def _end_if_alone(self) -> None:
         """A node must not drive valves for a session whose supervisor was killed."""
         supervisor = os.environ.get(SUPERVISOR)
         if supervisor and os.getppid() != int(supervisor):
-            self.stop.failed = self.stop.set = True
+            self.fail("supervisor_gone", "the session's supervisor was killed")
 
     def event(self, level: bytes, code: str, message: str, values: Mapping[str, str] | None = None) -> None:
         """Publish an event; ``code`` is its reason code."""
-        self._events.publish(self._array(level, self.get_name(), message, {"code": code, **(values or {})}))
+        self._events.publish(self._array(level, self.role, message, {"code": code, **(values or {})}))
+        self._log(level, code, message)
+
+    def _log(self, level: bytes, code: str, message: str) -> None:
+        """To the console and /rosout as well, once a second and code at most."""
+        now = time.monotonic()
+        if now - self._logged.get(code, -SAY_AGAIN) < SAY_AGAIN:
+            return
+        self._logged[code] = now
+        logger = self.get_logger()
+        # One call a level: rclpy refuses a place in the code that changes its severity.
+        if level == ERROR:
+            logger.error(f"{code}: {message}")
+        elif level == WARN:
+            logger.warning(f"{code}: {message}")
+        else:
+            logger.info(f"{code}: {message}")
 
     def _array(self, level: bytes, name: str, message: str, values: Mapping[str, str]) -> DiagnosticArray:
         status = DiagnosticStatus(level=level, name=name, message=message, hardware_id=self.hardware_id)
@@ -256,6 +339,25 @@ class RigNode(Node):
         out = DiagnosticArray(status=[status])
         out.header.stamp = self.get_clock().now().to_msg()
         return out
+
+
+def say(line: str, stream: TextIO | None = None) -> None:
+    """Print a line; a supervisor or terminal that has gone is no reason to stop driving valves in order."""
+    with suppress(OSError, ValueError):
+        print(line, file=stream or sys.stdout, flush=True)
+
+
+def tell_end(node: RigNode, elapsed: float, values: Mapping[str, str] | None = None) -> None:
+    """Of the node that is the rig, when it is stopped from outside: the recorder writes it into the log.
+
+    A session without a duration is over when it is stopped; one with a duration was cut short.
+    """
+    duration, failure = float(node.values["duration"]), noted_failure() or node.stop.reason
+    if duration or failure:
+        length, why = f" of {duration:g} s" if duration else "", f": {failure}" if failure else ""
+        node.event(WARN, "session_stopped", f"cut short after {elapsed:.3f} s{length}{why}", values)
+    else:
+        node.event(OK, "session_complete", f"stopped by the user after {elapsed:.3f} s", values)
 
 
 def node_parameters(table: Sequence[Parameter]) -> tuple[Parameter, ...]:

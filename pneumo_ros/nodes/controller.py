@@ -50,13 +50,13 @@ class ControllerNode(RigNode):
         self._publish_sliding = self.publisher(topics.SLIDING).publish
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
-        self._last_ns = 0
+        self._last_ns = self._last_stamp = self._said = 0
         self._refused = 0
         self._stale = False
         safety = load_safety(self.values["safety"] or None)
         self._closed, self._timeout_ns = np.array(safety.safe_command), round(safety.timeouts.estimate * 1e9)
         if not self.lockstep:
-            self.create_timer(WATCH_PERIOD, self._watch)
+            self.steady_timer(WATCH_PERIOD, self._watch)
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
     def _build(self) -> ControllerStage:
@@ -76,10 +76,13 @@ class ControllerNode(RigNode):
     def _on_estimate(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, estimate = self._read(data)
-        self._last_ns, self._stale = start, False
+        if stamp <= self._said and stamp > self._last_stamp:
+            return  # the safe command has overtaken this sample; a command's stamp never goes back
+        self._last_ns, self._last_stamp, self._stale = start, stamp, False
         self.course, output = advance(self.stage, self.course, stamp, estimate, self.period_ns)
         if output.refused:
             self._say_refused(stamp)
+        self._said = stamp
         self._publish(self._command(stamp, output.values))
         if self._steps % self.values["telemetry_every"] == 0:
             self._publish_sliding(self._sliding(stamp, output.telemetry))
@@ -94,7 +97,9 @@ class ControllerNode(RigNode):
         if not self._stale:
             self._stale = True
             self.event(WARN, "estimate_stale", f"no estimate for {age / 1e6:.1f} ms: safe command")
-        self._publish(self._command(self.get_clock().now().nanoseconds, self._closed))
+        # The time since the last sample, on its clock: neither simulated time nor a clock that was set matters.
+        self._said = self._last_stamp + age
+        self._publish(self._command(self._said, self._closed))
 
     def _say_refused(self, stamp: int) -> None:
         """Valves at trim instead of a command that is not finite; said once a second at most."""

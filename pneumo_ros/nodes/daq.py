@@ -20,7 +20,7 @@ from pneumo_ros.daq.calibration import DEFAULT
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import Phase
 from pneumo_ros.daq.driver import BAUD, SerialDriver
-from pneumo_ros.daq.reasons import Event, Level
+from pneumo_ros.daq.reasons import Event, Level, Reason
 from pneumo_ros.daq.report import LinkReport
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.errors import InputError
@@ -30,6 +30,8 @@ from pneumo_ros.nodes.base import ERROR, OK, WARN, RigNode
 from pneumo_ros.nodes.daq_output import MeasurementOutput, WallClock
 from pneumo_ros.nodes.daq_services import RigServices
 from pneumo_ros.nodes.daq_session import SessionCourse
+from pneumo_ros.nodes.emergency_stop import RESET_SERVICE
+from pneumo_ros.nodes.sources import SoleSource
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
@@ -66,7 +68,7 @@ class DaqNode(LifecycleNodeMixin, RigNode):
     """
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        RigNode.__init__(self, "daq", PARAMETERS, context=context, overrides=overrides)
+        RigNode.__init__(self, "daq", PARAMETERS, context=context, overrides=overrides, owns_time=True)
         if self.lockstep:
             raise InputError("hardware does not wait", where="daq", key="mode", value="lockstep", allowed="realtime")
         self.rig = load_rig(self.values["rig"] or None)
@@ -79,7 +81,8 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.operator = RigServices(self, lambda: self.driver, self.rig)
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
         self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode
-        self.subscribe(topics.COMMAND, self._on_command)
+        self.commands = self.subscribe(topics.COMMAND, self._on_command)
+        self._closed = tuple(self.safety.safe_command)
         self.reason = ""
         LifecycleNodeMixin.__init__(self)
         self.course = SessionCourse(self)
@@ -109,9 +112,11 @@ class DaqNode(LifecycleNodeMixin, RigNode):
             self._meet(driver)
         except InputError as error:
             driver.close()
-            return self._fail("configure_refused", str(error))
+            return self._refuse("configure_refused", str(error))
         self.driver, self.report = driver, LinkReport(driver)
         self.operator.publish(self.calibration)
+        assert driver.core.intake is not None
+        self.operator.meet(driver, driver.core.intake.hello.serial_number)
         return SUCCESS
 
     def _meet(self, driver: SerialDriver) -> None:
@@ -130,12 +135,28 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.output.decimation = int(ratio)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Arm the valves."""
-        why = self.driver.arm() if self.driver is not None else ["not configured"]
-        return self._fail("arm_refused", "; ".join(why)) if why else SUCCESS
+        """Arm the valves, for commands of the one publisher that is there now."""
+        why = self.blockers()
+        if not why and self.driver is not None:
+            self.commands.held = True
+            why = self.driver.arm()
+            self.commands.held = not why
+        return self._refuse("arm_refused", "; ".join(why)) if why else SUCCESS
+
+    def blockers(self) -> list[str]:
+        """Why the valves cannot be armed; empty if they can."""
+        if self.driver is None:
+            return ["not configured"]
+        why = self.driver.core.blockers(time.monotonic_ns())
+        if self.operator.latch.found():
+            why.append(f"emergency stop {self.operator.latch.found()}; a person resets it ({RESET_SERVICE})")
+        if self.commands.count > 1:
+            why.append(f"{self.commands.count} nodes publish {topics.COMMAND.name}")
+        return why
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Safe command."""
+        self.commands.held = bool(self.values["session_id"])
         if self.driver is not None:
             self.driver.disarm()
         return SUCCESS
@@ -149,26 +170,44 @@ class DaqNode(LifecycleNodeMixin, RigNode):
 
     on_shutdown = on_error = on_cleanup
 
-    def _fail(self, code: str, why: str) -> TransitionCallbackReturn:
+    def _refuse(self, code: str, why: str) -> TransitionCallbackReturn:
         self.event(ERROR, code, why)
         self.reason = why
         return FAILURE
 
     def on_stop(self, executor: Executor) -> None:
         """Valves safe and port closed before the last messages are delivered."""
+        if self.driver is not None:
+            self.driver.disarm()
+        self.course.tell_end()
         self.on_cleanup(LifecycleState("", 0))
         super().on_stop(executor)
+
+    def on_begin(self) -> None:
+        """Arm by itself, if that is wished."""
+        self.course.begin()
 
     # -- data ------------------------------------------------------------------------------------------------------
 
     def _on_command(self, data: bytes) -> None:
         start = time.monotonic_ns()
         stamp, areas = self._read_command(data)
-        if self.driver is not None:
+        if self.driver is not None and (self.output.gave(stamp) or areas == self._closed):
             self.driver.command(areas, self.wall.monotonic(stamp))
         self.timed(start)
 
+    def on_other_publisher(self, source: SoleSource, text: str) -> None:
+        """A second voice trips armed valves at once; without a session around it the node lives on, disarmed."""
+        if self.driver is not None:
+            self.driver.trip(Reason.COMMAND_FOREIGN, text)
+        if self.values["session_id"]:
+            super().on_other_publisher(source, text)
+
     def _on_event(self, event: Event) -> None:
+        if event.reason is Reason.ESTOP and event.level is Level.ERROR:
+            self.operator.keep(event.values.get("subject", "the driver"))
+        elif event.reason is Reason.ESTOP_RESET:
+            self.operator.released()
         self.event(LEVELS[event.level], event.reason.code, event.message, event.values)
 
     def health(self) -> dict[str, str]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 
 from pneumo_ros.daq.actuation import Applied
 from pneumo_ros.daq.frames import DeviceState
@@ -14,6 +15,7 @@ from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.rig import Rig
 
 SLEW_NS = 400_000  # ns the mapping to ROS time may move a second; less than a sample, so stamps never run back
+KEPT = 100  # samples a command may answer; far more than its age limit allows
 STEP_NS = 100_000_000  # ns: more than slewing accounts for; somebody set the clock
 
 
@@ -57,6 +59,7 @@ class MeasurementOutput:
         self.decimation = 1
         self.first: Measurement | None = None
         self.withheld = 0
+        self._given: deque[int] = deque(maxlen=KEPT)
         self._wall = wall
         variance = rig.pressure_noise.value**2
         joints = (topics.DISPLACEMENT, topics.RAW, topics.APPLIED)
@@ -70,6 +73,10 @@ class MeasurementOutput:
         """Publish an opening that went to the valves, stamped when it did; called from the driver's threads."""
         stamp = self._wall.ros(applied.time_ns)
         self._send_joint[topics.APPLIED](self._joint[topics.APPLIED].encode(stamp, applied.areas))
+
+    def gave(self, stamp: int) -> bool:
+        """Whether one of the last samples published has this stamp: a command for any other is nobody's answer."""
+        return stamp in self._given
 
     def send(self, measurement: Measurement) -> None:
         """Publish one measurement; called from the driver's thread."""
@@ -87,6 +94,7 @@ class MeasurementOutput:
         if not measurement.usable:
             self.withheld += 1
             return
+        self._given.append(stamp)
         self._send_joint[topics.DISPLACEMENT](self._joint[topics.DISPLACEMENT].encode(stamp, values[:4]))
         self._send_pressure[0](self._pressures[0].encode(stamp, values[4]))
         self._send_pressure[1](self._pressures[1].encode(stamp, values[5]))

@@ -8,11 +8,10 @@ import time
 from typing import TYPE_CHECKING
 
 from rclpy.lifecycle import TransitionCallbackReturn
-from std_msgs.msg import String
 
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.log.topics import READY
-from pneumo_ros.nodes.base import ERROR, OK
+from pneumo_ros.daq.reasons import Event
+from pneumo_ros.nodes.base import ERROR, OK, say, tell_end
 
 if TYPE_CHECKING:
     from pneumo_ros.nodes.daq import DaqNode
@@ -32,17 +31,29 @@ class SessionCourse:
 
     def __init__(self, node: DaqNode) -> None:
         self._node = node
-        self._ready: set[str] = set()
         self._asked = self._next_progress = 0.0
         self._first_ns = 0
-        node.create_subscription(String, READY.name, self._on_ready, node.ready_qos())
-        node.create_timer(LOOK_PERIOD, self._look)
+        self._over = False
+        node.steady_timer(LOOK_PERIOD, self._look)
 
-    def _on_ready(self, message: String) -> None:
-        self._ready.add(message.data)
-        wanted = set(str(self._node.values["session_nodes"]).split(","))
-        if not self._asked and self._node.values["autostart"] and wanted <= self._ready:
+    def begin(self) -> None:
+        """Every node of the session is ready."""
+        if self._node.values["autostart"]:
             self._asked = time.monotonic()
+
+    def tell_end(self) -> None:
+        """Say how far the session came, if it was ended from outside, and whether the valves were driven until then."""
+        if not self._first_ns or self._over:
+            return
+        tell_end(self._node, (time.monotonic_ns() - self._first_ns) * 1e-9)
+        trip = self._node.driver.core.trip if self._node.driver is not None else None
+        if trip is not None and not self._node.exit_code:
+            self._node.exit_code = TRIPPED
+            say(self._made_safe(trip), sys.stderr)
+
+    def _made_safe(self, trip: Event) -> str:
+        after = (trip.time_ns - self._first_ns) * 1e-9
+        return f"valves were made safe {after:.3f} s after arming: {trip.message}"
 
     def _look(self) -> None:
         node, state = self._node, self._node.state_label
@@ -63,7 +74,7 @@ class SessionCourse:
         if state == "unconfigured" and node.trigger_configure() is not done:
             self._give_up(node.reason)
         elif state == "inactive" and node.driver is not None:
-            why = node.driver.core.blockers(time.monotonic_ns())
+            why = node.blockers()
             if not why and node.trigger_activate() is done:
                 self._first_ns = time.monotonic_ns()
                 node.event(OK, "session_started", "valves armed", {"start_ns": str(node.wall.ros(self._first_ns))})
@@ -78,7 +89,7 @@ class SessionCourse:
         values = self._node.values
         if values["report_progress"] and elapsed >= self._next_progress:
             self._next_progress = elapsed + PROGRESS_PERIOD
-            print(f"PROGRESS {elapsed:.3f}", flush=True)
+            say(f"PROGRESS {elapsed:.3f}")
         if 0.0 < values["duration"] <= elapsed:
             self._finish()
 
@@ -88,11 +99,11 @@ class SessionCourse:
         if node.state_label == "active":
             node.trigger_deactivate()
         elif trip is not None:
-            after = (trip.time_ns - self._first_ns) * 1e-9
-            self._end(TRIPPED, f"valves were made safe {after:.3f} s after arming: {trip.message}")
+            self._end(TRIPPED, self._made_safe(trip))
+        self._over = True
         node.event(OK, "session_complete", "the session's duration has passed")
         node.stop.set = True
 
     def _end(self, code: int, words: str) -> None:
-        print(words, file=sys.stderr, flush=True)
+        say(words, sys.stderr)
         self._node.exit_code, self._node.stop.set = code, True

@@ -51,14 +51,17 @@ class LiveLink:
     Parameters
     ----------
     domain_id : DDS domain, or None for the environment's
+    namespace : ROS namespace of the session
     """
 
     title = "running session"
 
-    def __init__(self, domain_id: int | None = None) -> None:
+    def __init__(self, domain_id: int | None = None, namespace: str = "") -> None:
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node(NODE_NAME, context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._node = Node(
+            NODE_NAME, context=self._context, namespace=namespace, enable_rosout=False, start_parameter_services=False
+        )
         self._rings = {topic.name: Ring(_names(topic)) for topic in SHOWN}
         self._events: deque[Event] = deque(maxlen=1000)
         self._answers: deque[str] = deque(maxlen=100)
@@ -68,7 +71,9 @@ class LiveLink:
         self._start_ns, self._latest_ns, self._heard = 0, 0, 0.0
         self._ended = ""
         self._subscribe()
-        self._stop_topic = self._node.create_publisher(Bool, topics.ESTOP.name, publisher_qos(topics.ESTOP.flow, True))
+        self._stop_topic = self._node.create_publisher(
+            Bool, topics.ESTOP.relative, publisher_qos(topics.ESTOP.flow, True)
+        )
         self._trip = self._node.create_client(Trigger, TRIP_SERVICE)
         self._reset = self._node.create_client(Trigger, RESET_SERVICE)
         self._node.create_timer(LOOK_PERIOD, self._look_for_parameters)
@@ -98,12 +103,14 @@ class LiveLink:
         # Best effort: a page that cannot keep up loses samples; it must never hold up a reliable publisher.
         stream = QoSProfile(depth=_DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         for topic in SHOWN:
-            self._node.create_subscription(message_class(topic.type), topic.name, self._taker(topic), stream, raw=True)
+            self._node.create_subscription(
+                message_class(topic.type), topic.relative, self._taker(topic), stream, raw=True
+            )
         latched = QoSProfile(
             depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
         )
-        self._node.create_subscription(DiagnosticArray, topics.EVENTS.name, self._on_events, latched)
-        self._node.create_subscription(String, topics.CONFIG.name, self._on_config, latched)
+        self._node.create_subscription(DiagnosticArray, topics.EVENTS.relative, self._on_events, latched)
+        self._node.create_subscription(String, topics.CONFIG.relative, self._on_config, latched)
 
     def _taker(self, topic: topics.Topic) -> Callable[[bytes], None]:
         ring = self._rings[topic.name]

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 from rclpy.context import Context
+from rclpy.executors import Executor
 from std_msgs.msg import String
 
 from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
-from pneumo_ros.nodes.base import OK, RigNode
+from pneumo_ros.nodes.base import OK, RigNode, say, tell_end
 from pneumo_ros.nodes.emergency_stop import EmergencyStop
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
@@ -39,13 +40,14 @@ class PlantNode(RigNode):
     """Thin shell over :mod:`pneumo_ros.plant.stepping`: the nominal equations, or the rig as it was diagnosed."""
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("plant", PARAMETERS, context=context, overrides=overrides)
+        super().__init__("plant", PARAMETERS, context=context, overrides=overrides, owns_time=True)
         self.rig = load_rig(self.values["rig"] or None)
         self.stepped = stepped_rig(self.rig, self.period_ns / SECOND)
         self.state, self.command = self.stepped.init(), trim(self.rig).command
         self.noise = NoiseSource(self.rig, self.values["seed"])
         self.last = round(self.values["duration"] * self.values["rate_hz"])
         self.index = -1
+        self.finished = False
         self.start_ns = START_NS
         self.road = np.zeros((2, 2))
         self._commands: dict[int, NDArray[np.float64]] = {}
@@ -70,23 +72,16 @@ class PlantNode(RigNode):
         self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode_array
         self.subscribe(topics.COMMAND, self._on_command)
         self.subscribe(topics.ROAD, self._on_road)
-        self._others_ready: set[str] = set()
-        self.create_subscription(String, topics.READY.name, self._on_ready_message, self.ready_qos())
 
     # -- start -----------------------------------------------------------------------------------------------------
 
-    def _on_ready_message(self, message: String) -> None:
-        self._others_ready.add(message.data)
-        wanted = set(str(self.values["session_nodes"]).split(","))
-        if self.index < 0 and wanted <= self._others_ready:
-            self._begin()
-
-    def _begin(self) -> None:
+    def on_begin(self) -> None:
+        """The first sample."""
         self.index = 0
         if not self.lockstep:
             self.start_ns = time.time_ns()
             self._deadlines = Deadlines(time.monotonic_ns(), self.period_ns)
-            self.create_timer(self.period_ns / SECOND, self._tick)
+            self.steady_timer(self.period_ns / SECOND, self._tick)
         found = {"effects": ", ".join(one.label for one in self.rig.effects)} if self.rig.effects else {}
         self.event(OK, "session_started", "first sample", {"start_ns": str(self.start_ns), **found})
         self._publish_sample()
@@ -170,12 +165,19 @@ class PlantNode(RigNode):
             self._publish_truth(self._truth.encode(stamp, known.tolist()))
         if self.values["report_progress"] and time.monotonic() > self._next_progress:
             self._next_progress = time.monotonic() + PROGRESS_PERIOD
-            print(f"PROGRESS {self.index * self.period_ns / SECOND:.3f}", flush=True)
+            say(f"PROGRESS {self.index * self.period_ns / SECOND:.3f}")
 
     def finish(self, code: str, message: str) -> None:
         """End the session."""
+        self.finished = True
         self.event(OK, code, message, {"samples": str(self.index + 1)})
         self.stop.set = True
+
+    def on_stop(self, executor: Executor) -> None:
+        """Say how far the session came, if it was ended from outside."""
+        if not self.finished and self.index >= 0:
+            tell_end(self, self.index * self.period_ns / SECOND, {"samples": str(self.index + 1)})
+        super().on_stop(executor)
 
     def health(self) -> dict[str, str]:
         """Loop figures and missed deadlines."""

@@ -15,8 +15,9 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import BY_NAME, Flow
 
 RECORDER_DEPTH = 10_000  # a chunk flush may hold the recorder for 10 ms; lockstep sends thousands of samples a second
+LOCKSTEP_DEPTH = 2000  # samples a writer keeps for a recorder that another program holds up: 0.2 s of quick lockstep
 
-_DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10}
+_DEPTH = {Flow.STREAM: 200, Flow.CLOCK: 1, Flow.LATCHED: 1, Flow.EVENTS: 100, Flow.STATUS: 10, Flow.STOP: 10}
 
 
 OVERRIDABLE = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
@@ -69,7 +70,7 @@ def publisher_qos(flow: Flow, lockstep: bool) -> QoSProfile:
     reliable = lockstep or flow is not Flow.CLOCK
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=_DEPTH[flow],
+        depth=LOCKSTEP_DEPTH if lockstep and flow is Flow.STREAM else _DEPTH[flow],
         reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )

@@ -4,27 +4,31 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.context import Context
 from rclpy.executors import Executor
+from rclpy.serialization import deserialize_message
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.provenance import versions
-from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, STRING, TOPICS, Topic
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, STRING, TOPICS, Topic
 from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
-from pneumo_ros.nodes.base import WARN, RigNode
+from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.session.supervisor import END_REASON
+from pneumo_ros.session.ending import RIG_NODES, Ending
+from pneumo_ros.session.supervisor import noted_failure
 
 DRAIN_LIMIT = 5.0  # s
+WATCH_PERIOD = 0.1  # s between looks whether the stamps written are in order
 QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
 PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "every parameter change", "")
 PARAMETERS: tuple[Parameter, ...] = (
@@ -41,8 +45,10 @@ class SessionRecorderNode(RigNode):
         self.writer = LogWriter(Path(self.values["output"]), self._metadata())
         self.written: Written | None = None
         self._warned = False
+        self.ending = Ending()
         for topic in (*(t for t in TOPICS if t.recorded), PARAMETER_EVENTS):
             self._record(topic)
+        self.steady_timer(WATCH_PERIOD, self._watch)
 
     def _metadata(self) -> dict[str, dict[str, str]]:
         try:
@@ -58,11 +64,43 @@ class SessionRecorderNode(RigNode):
 
     def _record(self, topic: Topic) -> None:
         offered = rosbag2_qos(publisher_qos(topic.flow, self.lockstep))
-        channel = self.writer.add_topic(topic.name, topic.type, [offered])
-        stamped = topic.type not in (STRING, PARAMETER_EVENTS.type)
-        self.create_subscription(
-            message_class(topic.type), topic.name, self._callback(channel, stamped), recorder_qos(topic.flow), raw=True
-        )
+        channel = self.writer.add_topic(topic.name, topic.type, [offered], self._step(topic))
+        take = self._callback(channel, topic.type not in (STRING, PARAMETER_EVENTS.type))
+        if topic is PARAMETER_EVENTS:  # absolute, and of every node of the domain
+            kind, qos = message_class(topic.type), recorder_qos(topic.flow)
+            self.create_subscription(kind, topic.name, self._of_this_namespace(take), qos, raw=True)
+        else:
+            self.subscribe(topic, self._hearing(take) if topic is EVENTS else take, recorder_qos(topic.flow))
+
+    def _step(self, topic: Topic) -> int | None:
+        """How the stamps of a topic must rise: every sample in lockstep, upwards in any case; None where many speak."""
+        if not topic.publisher or topic.type not in (JOINT, PRESSURE):
+            return None
+        return self.period_ns if self.lockstep and topic in EVERY_PERIOD else 0
+
+    def _watch(self) -> None:
+        if self.writer.disorder:
+            self.fail("stamps_disordered", self.writer.disorder)
+
+    def _of_this_namespace(self, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        """Only what nodes of this namespace say."""
+        namespace = self.get_namespace()
+
+        def taken(data: bytes) -> None:
+            if deserialize_message(data, ParameterEvent).node.rpartition("/")[0] == namespace.rstrip("/"):
+                take(data)
+
+        return taken
+
+    def _hearing(self, take: Callable[[bytes], None]) -> Callable[[bytes], None]:
+        """Also remember how the session ended, and what went wrong last."""
+
+        def taken(data: bytes) -> None:
+            take(data)
+            for status in deserialize_message(data, DiagnosticArray).status:
+                self.ending.hear(status.level == ERROR, {v.key: v.value for v in status.values}, status.message)
+
+        return taken
 
     def _callback(self, channel: Channel, stamped: bool) -> Callable[[bytes], None]:
         """What to do with a message of a channel.
@@ -87,14 +125,13 @@ class SessionRecorderNode(RigNode):
     def on_stop(self, executor: Executor) -> None:
         """Take what is still in the queues, then finish the file."""
         self.drain(executor)
-        self.written = self.writer.finish(not self.stop.failed, self._reason())
-
-    def _reason(self) -> str:
-        """Why the session failed, as its supervisor left it."""
-        note = os.environ.get(END_REASON)
         if not self.stop.failed:
-            return ""
-        return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else "stopped by SIGTERM"
+            self.stop.set = False  # the last messages too must be in order
+            self._watch()
+            self.stop.set = True
+        reason = self.stop.reason if self.stop.failed else ""
+        complete, why = self.ending.verdict(RIG_NODES & self.session_nodes, noted_failure() or reason)
+        self.written = self.writer.finish(complete, why)
 
     def drain(self, executor: Executor) -> None:
         """Spin until nothing has come for :data:`QUIET_PERIOD`; for nodes that never fall silent there is a limit."""

@@ -15,7 +15,7 @@ from pneumo_ros.nodes.estimator import EstimatorNode
 from pneumo_ros.nodes.plant import PlantNode
 from pneumo_ros.nodes.road_profile import RoadProfileNode
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode
-from pneumo_ros.nodes.spin import BAD_INPUT, SignalStop, spin
+from pneumo_ros.nodes.spin import BAD_INPUT, SignalStop, ask_no_more, spin
 
 # The recorder comes last: it is stopped after the others have said their last.
 NODES = (RoadProfileNode, PlantNode, EstimatorNode, ControllerNode, SessionRecorderNode)
@@ -32,6 +32,7 @@ def main(args: list[str] | None = None) -> int:
     except ParameterException as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
     finally:
+        ask_no_more()
         rclpy.try_shutdown()
     return BAD_INPUT
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 import sys
 import time
@@ -18,24 +20,47 @@ from rclpy.signals import SignalHandlerOptions
 
 from pneumo_ros.daq.priority import freeze_startup_objects
 from pneumo_ros.errors import PneumoError
-from pneumo_ros.nodes.base import RigNode, StopRequest
+from pneumo_ros.nodes.base import FAILED, RigNode, StopRequest, say
+from pneumo_ros.session.supervisor import SUPERVISOR
 
 SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
 TICK_TIMEOUT = 2.0  # s within which a timer must tick on a working executor
 BAD_INPUT = 2
+ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+PR_SET_PDEATHSIG = 1  # of Linux's prctl
 
 
 class SignalStop(StopRequest):
-    """Set by SIGINT (the session is over) and SIGTERM (something broke)."""
+    """Set by SIGINT (the session is over), SIGTERM and SIGHUP (something broke); repeating them changes nothing."""
 
     def __init__(self) -> None:
         super().__init__()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ASKING:
             signal.signal(number, self._on_signal)
+        end_with_supervisor()
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if number != signal.SIGINT and not self.set:
+            alone = SUPERVISOR in os.environ and os.getppid() != int(os.environ[SUPERVISOR])
+            why = "the session's supervisor was killed" if alone else f"stopped by {signal.Signals(number).name}"
+            self.failed, self.reason = True, why
         self.set = True
-        self.failed |= number == signal.SIGTERM
+
+
+def ask_no_more() -> None:
+    """Everything is done: who asks again must not turn an orderly end into a killed process.
+
+    Python hands signals back to the kernel's default, which kills, while the interpreter ends; ignored ones stay so.
+    """
+    for number in ASKING:
+        signal.signal(number, signal.SIG_IGN)
+
+
+def end_with_supervisor() -> None:
+    """Be sent SIGTERM at once when the supervisor's process ends, however it ends."""
+    supervisor = os.environ.get(SUPERVISOR)
+    if supervisor:
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def make_executor(kind: str, context: Context | None) -> Executor:
@@ -46,7 +71,7 @@ def make_executor(kind: str, context: Context | None) -> Executor:
 def check_timer_ticks(node: RigNode, executor: Executor) -> bool:
     """Whether a timer of ``node`` fires on ``executor`` within :data:`TICK_TIMEOUT`."""
     ticks: list[int] = []
-    timer = node.create_timer(0.001, lambda: ticks.append(1))
+    timer = node.steady_timer(0.001, lambda: ticks.append(1))
     end = time.monotonic() + TICK_TIMEOUT
     while not ticks and time.monotonic() < end:
         executor.spin_once(timeout_sec=SPIN_TIMEOUT)
@@ -73,16 +98,19 @@ def working_executor(nodes: Sequence[RigNode], context: Context | None) -> Execu
 
 def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = None) -> int:
     """Spin until every node has finished or a stop is asked for; returns the worst exit code."""
-    executor = working_executor(nodes, context)
     for node in nodes:
         node.stop = stop
+    executor = working_executor(nodes, context)
     freeze_startup_objects()
     spin_once = executor.spin_once
     while not stop.set:
         spin_once(SPIN_TIMEOUT)
     for node in nodes:
         node.on_stop(executor)
-    return max(node.exit_code for node in nodes)
+    code = max(node.exit_code for node in nodes)
+    if stop.failed and not code:  # ended from outside
+        say(f"error: {stop.reason}", sys.stderr)
+    return code or (FAILED if stop.failed else 0)
 
 
 def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> int:
@@ -102,5 +130,6 @@ def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> in
         )
         code = BAD_INPUT
     finally:
+        ask_no_more()
         rclpy.try_shutdown()
     return code

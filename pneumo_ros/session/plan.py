@@ -21,7 +21,8 @@ OVERRIDES = "qos_overrides."
 def read_config(path: Path, tables: Tables) -> Values:
     """A ROS 2 parameter file (node -> ros__parameters -> name -> value), every entry checked against its table.
 
-    ``/**`` gives a value to every node that knows the name.
+    ``/**`` gives a value to every node that knows the name; ``/**/plant`` and ``/rig1/plant`` mean ``plant``,
+    for a file is read for one session, whatever its namespace.
 
     Raises
     ------
@@ -36,7 +37,7 @@ def read_config(path: Path, tables: Tables) -> Values:
             raise InputError("needs a mapping ros__parameters", where=path, key=str(node), value=entry,
                              remedy=f"write {node}: {{ros__parameters: {{...}}}}")  # fmt: skip
         for key, value in _flat(own):
-            assign(out, tables, str(node).lstrip("/") or "**", str(key), value, path)
+            assign(out, tables, _bare(str(node)), str(key), value, path)
     return out
 
 
@@ -67,6 +68,11 @@ def assign(out: Values, tables: Tables, node: str, key: str, raw: object, where:
             raise InputError("unknown parameter", where=where, key=f"{node}.{key}", value=raw,
                              allowed=", ".join(known), remedy="correct the name or remove it")  # fmt: skip
         out[target][key] = spec.checked(raw, f"{where}: {target}")
+
+
+def _bare(node: str) -> str:
+    """A node's own name, or ``**`` for all, from a key of a parameter file."""
+    return node.rpartition("/")[2] or "**"
 
 
 def parse_setting(text: str) -> tuple[str, str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import queue
+import re
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 from typing import IO
 
 import yaml
@@ -24,6 +26,7 @@ from pneumo_ros.parameters import Value
 SUPERVISOR = "PNEUMO_SUPERVISOR"  # environment variable: process whose end ends the nodes as well
 PROGRESS = "PROGRESS "
 POLL = 0.02  # s
+LOGGED = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[")  # how rcl's logger begins a line
 STOP_PATIENCE = 5.0  # s a process has to end after SIGINT before it is killed
 RECORDER_PATIENCE = 60.0  # s; a slow disk may still be taking the log
 START_PATIENCE = 60.0  # s until the first sample; the first start on a machine compiles the plant
@@ -31,8 +34,43 @@ RECORDER = "session_recorder"
 END_REASON = "PNEUMO_END_REASON"  # environment variable: file in which the supervisor says why a session failed
 
 
+def noted_failure() -> str:
+    """Why the session failed, as its supervisor (or launch) left it to this node; '' if it did not."""
+    note = os.environ.get(END_REASON)
+    return Path(note).read_text(encoding="utf-8") if note and Path(note).exists() else ""
+
+
 class SessionError(PneumoError):
     """A node of the session ended by itself."""
+
+
+class StopAsked(Exception):  # noqa: N818  it is a wish, not an error
+    """Somebody asked the session to end: Ctrl-C, SIGTERM, or a terminal that was closed."""
+
+
+STOPPING = {signal.SIGINT: "the user", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP (closed terminal)"}
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where in the ROS graph a session runs.
+
+    Attributes
+    ----------
+    domain_id : DDS domain
+    namespace : of its nodes and topics, '' or of the form /rig1
+    descriptors : files that stay open in every node, so that the place counts as taken until the last one has ended
+    """
+
+    domain_id: int | None = None
+    namespace: str = ""
+    descriptors: tuple[int, ...] = ()
+
+    def arguments(self) -> list[str]:
+        """ROS arguments of a node. /clock is absolute by convention; each session has its own."""
+        if not self.namespace:
+            return []
+        return ["--remap", f"__ns:={self.namespace}", "--remap", "/clock:=clock"]
 
 
 @dataclass
@@ -45,15 +83,17 @@ class NodeProcess:
     said: list[str] = field(default_factory=list)
 
     def last_words(self) -> str:
-        """The last line it printed."""
+        """The last line it printed; what its logger says is of the way, not of the end."""
         lines = [line for line in self.said if line.strip() and not line.startswith(PROGRESS)]
-        return lines[-1].strip() if lines else ""
+        plain = [line for line in lines if not LOGGED.match(line)]
+        return plain[-1].strip() if plain else ""
 
 
 def write_parameters(values: Mapping[str, Mapping[str, Value]], folder: Path) -> Path:
     """A ROS 2 parameter file: node -> name -> value."""
     path = folder / "parameters.yaml"
-    document = {node: {"ros__parameters": dict(own)} for node, own in values.items()}
+    # In whatever namespace the nodes are.
+    document = {f"/**/{node}": {"ros__parameters": dict(own)} for node, own in values.items()}
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path
 
@@ -66,10 +106,12 @@ class Supervisor:
     nodes : one process each, in the order they are stopped; the recorder is always stopped last
     parameters : node -> name -> value
     lead : process whose end with exit code 0 ends the session
-    domain_id : DDS domain, or None for the environment's
+    place : where its nodes are in the ROS graph
     on_progress : called with the simulated time in s
+    on_line : called with every other line that a node prints
 
-    A context manager: leaving it ends every process.
+    A context manager: leaving it ends every process. Between, SIGINT, SIGTERM and SIGHUP end :meth:`wait`; further ones
+    change nothing, so that the log is finished however often somebody asks.
     """
 
     def __init__(
@@ -77,29 +119,38 @@ class Supervisor:
         nodes: Sequence[NodeProcess],
         parameters: Mapping[str, Mapping[str, Value]],
         lead: str,
-        domain_id: int | None = None,
+        place: Place | None = None,
         on_progress: Callable[[float], None] = lambda _: None,
+        on_line: Callable[[str, str], None] = lambda _, __: None,
     ) -> None:
+        self._place = place or Place()
         self.nodes = list(nodes)
         self.lead = next(n for n in self.nodes if n.name == lead)
         self._parameters = parameters
-        self._on_progress = on_progress
+        self._on_progress, self._on_line = on_progress, on_line
+        self._asked_by = ""
+        self._rosout = not any(own.get("mode") == "lockstep" for own in parameters.values())
         self._folder = tempfile.TemporaryDirectory(prefix="pneumo-")
         self._lines: queue.SimpleQueue[tuple[NodeProcess, str]] = queue.SimpleQueue()
         self._environment = dict(os.environ)
         # A session stays on this computer unless the user opened it to the network.
         self._environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        if domain_id is not None:
-            self._environment["ROS_DOMAIN_ID"] = str(domain_id)
+        if self._place.domain_id is not None:
+            self._environment["ROS_DOMAIN_ID"] = str(self._place.domain_id)
         self._environment[END_REASON] = str(Path(self._folder.name) / "end_reason")
         self._environment[SUPERVISOR] = str(os.getpid())
         self._progress = -1.0
 
     def __enter__(self) -> Supervisor:
         file = write_parameters(self._parameters, Path(self._folder.name))
+        arguments = ["--ros-args", "--params-file", str(file), *self._place.arguments()]
+        if not self._rosout:  # thousands of samples a second leave no time for a topic nobody reads
+            arguments.append("--disable-rosout-logs")
+        for number in STOPPING:  # each of them: a background job inherits an ignored SIGINT
+            signal.signal(number, self._on_signal)
         for node in self.nodes:
             node.process = subprocess.Popen(
-                [sys.executable, "-m", node.module, "--ros-args", "--params-file", str(file)],
+                [sys.executable, "-m", node.module, *arguments], pass_fds=self._place.descriptors,
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=self._environment,
                 start_new_session=True,  # Ctrl-C reaches this process alone; it then ends the others in order
             )  # fmt: skip
@@ -111,6 +162,9 @@ class Supervisor:
         self.stop(str(error) if isinstance(error, SessionError) else "")
         self._folder.cleanup()
 
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._asked_by = self._asked_by or STOPPING[signal.Signals(number)]
+
     def wait(self) -> None:
         """Until the lead has done its work.
 
@@ -118,10 +172,14 @@ class Supervisor:
         ------
         SessionError
             naming the node that ended too early, with its exit code and last words.
+        StopAsked
+            naming who asked for the end.
         """
         start = time.monotonic()
         while True:
             self._hear()
+            if self._asked_by:
+                raise StopAsked(self._asked_by)
             for node in self.nodes:
                 assert node.process is not None
                 code = node.process.poll()
@@ -132,7 +190,7 @@ class Supervisor:
                     self._hear()
                     raise SessionError(describe_end(node, code))
             if self._progress < 0.0 and time.monotonic() - start > START_PATIENCE:
-                raise SessionError(f"no first sample within {START_PATIENCE:.0f} s; is another session on this domain?")
+                raise SessionError(f"no first sample within {START_PATIENCE:.0f} s; the nodes did not find each other")
             time.sleep(POLL)
 
     def stop(self, failure: str = "") -> None:
@@ -153,6 +211,11 @@ class Supervisor:
                 _wait_or_kill(node, end)
         self._hear()
 
+    def failure_of_lead(self) -> str:
+        """What the lead had to say if it did not end well when it was stopped, else ''."""
+        code = self.lead.process.poll() if self.lead.process is not None else None
+        return describe_end(self.lead, code) if code else ""
+
     def _listen(self, node: NodeProcess, stream: IO[str]) -> None:
         for line in stream:
             self._lines.put((node, line))
@@ -165,7 +228,9 @@ class Supervisor:
                 return
             node.said.append(line)
             del node.said[:-200]
-            if line.startswith(PROGRESS):
+            if not line.startswith(PROGRESS):
+                self._on_line(node.name, line.rstrip("\n"))
+            else:
                 self._progress = float(line[len(PROGRESS) :])
                 self._on_progress(self._progress)
 
@@ -180,6 +245,7 @@ def describe_end(node: NodeProcess, code: int) -> str:
 def _signal(node: NodeProcess, number: signal.Signals) -> None:
     if node.process is not None and node.process.poll() is None:
         node.process.send_signal(number)
+        node.process.send_signal(signal.SIGCONT)  # a stopped process could not obey
 
 
 def _wait_or_kill(node: NodeProcess, end: float) -> None:

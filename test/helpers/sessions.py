@@ -20,9 +20,10 @@ def own_domain() -> int:
 
 
 def start(*options: str, domain: int | None = None) -> subprocess.Popen[str]:
-    """`pneumo run` with options, in a domain of its own."""
+    """`pneumo run` with options, in a domain of its own; -1 for the one that the options ask for."""
     domain = own_domain() if domain is None else domain
-    command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--domain-id", str(domain), *options]
+    place = [] if domain < 0 else ["--domain", str(domain)]
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", *place, *options]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 

@@ -105,14 +105,14 @@ def test_a_node_refuses_a_bad_parameter_on_its_own(node: str) -> None:
 
 
 def test_every_preset_is_made_of_parameters_the_nodes_have() -> None:
-    from pneumo_ros.cli.run import _controller_options, node_tables
-    from pneumo_ros.control.presets import PRESETS
+    from pneumo_ros.cli.run import node_tables
+    from pneumo_ros.control.presets import PRESETS, controller_settings
     from pneumo_ros.session.plan import assign
 
     tables = node_tables()
     for name in PRESETS:
         values = {node: {} for node in tables}
-        for node, key, raw in _controller_options(name):
+        for node, key, raw in controller_settings(name):
             assign(values, tables, node, key, raw, name)
         assert "controller" in values["controller"]
     assert values["estimator"]["known_surface"] is True, "the last preset uses the known surface"

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sessions side by side: apart in domains and namespaces, refused where one runs, ended by an intruding publisher."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+import rclpy
+from helpers import sessions
+from rclpy.context import Context
+from sensor_msgs.msg import JointState
+
+from pneumo_ros.log import topics
+from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.nodes.neighbours import neighbours
+from pneumo_ros.session.claim import Claim
+
+SHORT = ("--duration", "2", "--seed", "5", "--no-picture", "--no-report")
+ENDLESS = ("--duration", "0", "--seed", "5", "--no-picture", "--no-report")
+SIGNALS = (topics.ROAD, *topics.MEASUREMENTS, topics.COMMAND, topics.ESTIMATE, topics.TRUTH)
+
+
+def same_as_alone(alone: Log, log: Log, whole: bool) -> None:
+    """Byte for byte, to the end of the shorter one."""
+    for topic in SIGNALS:
+        one, two = (np.asarray(each.records(topic.name).data) for each in (alone, log))
+        shorter = min(len(one), len(two))
+        assert shorter and (not whole or len(one) == len(two)), topic.name
+        np.testing.assert_array_equal(one[:shorter], two[:shorter], topic.name)
+
+
+def ending(log: Log) -> dict[str, str]:
+    return next(m.metadata for m in log.metadata if m.name == "session")
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    path = tmp_path_factory.mktemp("alone") / "x.mcap"
+    code, said = sessions.run(*SHORT, "--output", str(path), "--single-process")
+    assert code == 0, said
+    return read_log(path)
+
+
+@contextmanager
+def intruder(domain: int, topic: str) -> Iterator[Any]:
+    """A node that publishes what belongs to a session."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node("intruder", context=context)
+    try:
+        yield node.create_publisher(JointState, topic, 10)
+    finally:
+        context.try_shutdown()
+
+
+@pytest.mark.slow
+def test_two_rigs_in_namespaces_of_one_domain_and_a_third_that_is_refused(tmp_path: Path, alone: Log) -> None:
+    domain = sessions.own_domain()
+    started = {
+        name: sessions.start(
+            *ENDLESS, "--namespace", name, "--use-sim-time", "--output", str(tmp_path / f"{name}.mcap"), domain=domain
+        )
+        for name in ("rig1", "rig2")
+    }
+    for name, process in started.items():
+        sessions.wait_for(process, tmp_path / f"{name}.mcap.part", 300_000)
+    third = sessions.start(*SHORT, "--namespace", "rig1", "--output", str(tmp_path / "third.mcap"), domain=domain)
+    said, _ = third.communicate(timeout=180)
+    assert third.returncode == 2 and "a session runs here already (sim, " in said and "--isolate" in said
+    assert not (tmp_path / "third.mcap").exists() and len(said.strip().splitlines()) == 1
+    started["rig1"].send_signal(2)
+    assert "stopped by the user; the log is finished" in started["rig1"].communicate(timeout=180)[0]
+    assert started["rig2"].poll() is None, "one stops, the other goes on"
+    started["rig2"].send_signal(2)
+    started["rig2"].communicate(timeout=180)
+    for name, process in started.items():
+        log = read_log(tmp_path / f"{name}.mcap")
+        assert process.returncode == 0 and ending(log) == {"complete": "true", "reason": ""}
+        same_as_alone(alone, log, whole=False)
+
+
+@pytest.mark.slow
+def test_simulations_isolate_themselves_and_log_what_they_log_alone(tmp_path: Path, alone: Log) -> None:
+    started = [
+        sessions.start(*SHORT, "--isolate", "--output", str(tmp_path / f"{i}.mcap"), "--single-process", domain=-1)
+        for i in range(3)
+    ]
+    for number, process in enumerate(started):
+        said, _ = process.communicate(timeout=240)
+        assert process.returncode == 0, said
+        same_as_alone(alone, read_log(tmp_path / f"{number}.mcap"), whole=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("options", [(), ("--single-process",)], ids=["processes", "one process"])
+def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_used(
+    tmp_path: Path, alone: Log, options: tuple[str, ...]
+) -> None:
+    domain, path = sessions.own_domain(), tmp_path / "x.mcap"
+    process = sessions.start(*ENDLESS, *options, "--output", str(path), domain=domain)
+    sessions.wait_for(process, path.with_name("x.mcap.part"), 300_000)
+    with intruder(domain, "/valve/command") as publisher:
+        message = JointState(name=list(topics.COMMAND.names), position=[1e-5] * 4)
+        while process.poll() is None:
+            publisher.publish(message)
+            time.sleep(0.001)
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 1 and "2 nodes publish /valve/command" in said and "/intruder" in said, said
+    log = read_log(path)
+    assert ending(log)["complete"] == "false" and "/valve/command" in ending(log)["reason"]
+    same_as_alone(alone, log, whole=False)
+
+
+def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_path: Path) -> None:
+    domain = sessions.own_domain()
+    with intruder(domain, "/rig1/rig/displacement"):
+        assert neighbours(domain, "") == []
+        assert neighbours(domain, "/rig1") == ["/intruder publishes /rig1/rig/displacement"]
+        process = sessions.start(*SHORT, "--namespace", "rig1", "--output", str(tmp_path / "x.mcap"), domain=domain)
+        said, _ = process.communicate(timeout=180)
+    assert process.returncode == 2 and "/intruder publishes /rig1/rig/displacement" in said
+    assert not list(tmp_path.glob("x.mcap*"))
+
+
+@pytest.mark.parametrize("there", ["sim, a.mcap", "serial, a.mcap"])
+@pytest.mark.parametrize("options", [(), ("--source", "serial", "--port", "/dev/null")], ids=["sim", "serial"])
+def test_neither_kind_of_session_starts_beside_the_other(tmp_path: Path, there: str, options: tuple[str, ...]) -> None:
+    domain = sessions.own_domain()
+    claim = Claim(domain, "", there)
+    try:
+        process = sessions.start(*SHORT, *options, "--output", str(tmp_path / "x.mcap"), domain=domain)
+        said, _ = process.communicate(timeout=180)
+    finally:
+        claim.release()
+    assert process.returncode == 2 and f"domain {domain}: a session runs here already ({there}, process " in said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [(("--isolate", "--domain", "3"), "either a domain"), (("--namespace", "rig 1"), "not a ROS namespace")],
+)
+def test_bad_places_are_named(tmp_path: Path, options: tuple[str, ...], word: str) -> None:
+    process = sessions.start(*SHORT, *options, "--output", str(tmp_path / "x.mcap"), domain=-1)
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 2 and word in said
