@@ -49,6 +49,11 @@ PROFILES = {
     Flow.LATCHED: ("reliable, transient local, depth 1: as a map", "the same", "-"),
     Flow.EVENTS: ("reliable, transient local, depth 100", "the same", "not covered; rare, and each one matters"),
     Flow.STATUS: ("reliable, volatile", "the same", "not covered; as diagnostic_updater does"),
+    Flow.STOP: (
+        "any",
+        "reliable, volatile; the valves' owner also best effort and transient local",
+        "not covered; whoever asks for a stop must be heard, whatever it offers",
+    ),
 }
 OVERRIDES = """
 **Overrides.** History, depth, reliability and durability of every publisher and subscription of a node are read-only
