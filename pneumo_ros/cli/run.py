@@ -372,7 +372,7 @@ def _run_session(
 
 
 def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None:
-    """One sentence that is true: with a log or without one, after a trip or without."""
+    """What became of the log when somebody ended the session; an end before the first sample leaves none."""
     from pneumo_ros.log import topics
     from pneumo_ros.log.reading import read_log
 
@@ -381,12 +381,12 @@ def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None
         _save_what_is_left(target)
         raise typer.Exit(FAILED)
     if not target.exists():
-        console.print(f"stopped by {by} before there was anything to log")
+        console.print(f"stopped by {by} before the session began: there is no log")
         raise typer.Exit(INTERRUPTED)
     found = read_log(target, [topics.DISPLACEMENT.name]).topics.get(topics.DISPLACEMENT.name)
     if found is None or found.count < MIN_SAMPLES:
         console.print(f"stopped by {by} before there was anything to show; the log holds the start: {target}")
-        raise typer.Exit
+        raise typer.Exit(INTERRUPTED)
     console.print(f"stopped by {by}; the log is finished")
 
 

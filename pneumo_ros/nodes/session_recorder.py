@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.provenance import versions
-from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, STRING, TOPICS, Topic
+from pneumo_ros.log.topics import APPLIED, DIAGNOSTIC, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, STRING, TOPICS, Topic
 from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.interfaces import message_class
@@ -73,8 +73,11 @@ class SessionRecorderNode(RigNode):
             self.subscribe(topic, self._hearing(take) if topic is EVENTS else take, recorder_qos(topic.flow))
 
     def _step(self, topic: Topic) -> int | None:
-        """How the stamps of a topic must rise: every sample in lockstep, upwards in any case; None where many speak."""
-        if not topic.publisher or topic.type not in (JOINT, PRESSURE):
+        """How the stamps of a topic must rise: every sample in lockstep, upwards in any case; None where many speak.
+
+        What reached the valves is stamped when it did, on a clock that is slewed; the others have a sample's stamp.
+        """
+        if not topic.publisher or topic.type not in (JOINT, PRESSURE) or topic is APPLIED:
             return None
         return self.period_ns if self.lockstep and topic in EVERY_PERIOD else 0
 
