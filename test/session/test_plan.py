@@ -51,7 +51,7 @@ def test_bad_config_file(tmp_path: Path, text: str, words: list[str]) -> None:
     [
         (["--config", "no_such_file.yaml"], ["no_such_file.yaml"]),
         (["--rig", "no_such_rig.yaml"], ["no_such_rig.yaml"]),
-        (["--road", "Q"], ["Q", "iso"]),
+        (["--road", "Q"], ["Q", "sweep"]),
         (["--road", "no_such_road.csv"], ["no_such_road.csv"]),
         (["--controller", "pid"], ["pid", "first_order_smflc"]),
         (["--speed", "0"], ["speed_kmh", "1 to 300 km/h"]),

@@ -33,10 +33,10 @@ class Calibration:
     first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
     closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
         "something else acts there"
-    ceiling : how many times what the ceiling leaves the whole structure may leave at that
     steepness : exponent of these transitions
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
+    slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
     walls : parameters at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
@@ -45,11 +45,11 @@ class Calibration:
     first_toll: float = 9.0
     second_toll: float = 9.0
     closes: float = 0.5
-    ceiling: float = 2.0
     steepness: float = 4.0
     real: float = 2.5
     walls: float = 1.3
-    least: float = 0.015
+    least: float = 0.002
+    slight: float = 0.12
     held_real: float = 3.0
 
 
@@ -145,7 +145,9 @@ def judge(
 def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: Calibration) -> float:
     """Probability that an effect of the structure is what acts at its place, 0..1."""
     c = calibration
-    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls, c.least / max(one.share, 1e-9)]
+    closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
+    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls, c.least / max(one.share, 1e-9),
+               c.slight / max(closed, 1e-9)]  # fmt: skip
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

@@ -112,7 +112,7 @@ FORCE = Term("force", PlantTerm(states=8, start=start, advance=advance, force=fo
 EFFECTS = (
     FORCE.shape(
         "coulomb_friction",
-        [f"friction_out {r:g} m/s" for r in RATES[:3]] + [f"friction_in {r:g} m/s" for r in RATES[:3]]
+        [f"friction_out {r:g} m/s" for r in RATES[:2]] + [f"friction_in {r:g} m/s" for r in RATES[:2]]
         + ["load_friction", *(f"slider {s:g} m" for s in SLACKS[:3])],
         "dry friction of any law: saturating in rate, with or without sticking",
     ),

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.rig_logs import excitation, signals_of, simulated
+from helpers.own_logs import QUICK, drawn, driven, log
+from helpers.rig_logs import excitation, signals_of
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
 from pneumo_ros.diagnosis.fit.command_events import timed
@@ -15,40 +16,17 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
-from pneumo_ros.diagnosis.search.competition import Effort, starts_elsewhere
+from pneumo_ros.diagnosis.search.competition import starts_elsewhere
 from pneumo_ros.diagnosis.search.screening import all_parts, promises, trials, visibility
-from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 
-QUICK = Effort(singles=5, finalists=3, seconds=(2,), blind_pairs=1, pair_finalists=2)
-
 
 @pytest.fixture(scope="module")
 def model() -> RigModel:
     return RigModel(load_rig())
-
-
-def drawn(model: RigModel, seed: int, spread: float = 1.0) -> np.ndarray:
-    """Nuisance values inside the tolerances."""
-    rng = np.random.default_rng(seed)
-    sigmas = np.clip(rng.normal(size=len(model.parameters)), -2.0, 2.0) * spread
-    return np.array([p.nominal + p.std * s for p, s in zip(model.parameters, sigmas, strict=True)])
-
-
-def log(model: RigModel, seed: int, nuisance: np.ndarray | None = None, active: tuple[Active, ...] = ()) -> Signals:
-    """A log of the model itself, from rest at the nominal trim, with sensor noise."""
-    road, commands = excitation(6.0, seed)
-    inputs = driven(road, commands)
-    clean = model.simulate(inputs, nuisance, trim(model.rig).state, active)
-    return signals_of(clean, road, commands, seed, f"log-{seed}")
-
-
-def driven(road: np.ndarray, commands: np.ndarray) -> Signals:
-    """Inputs alone, the sensors still at rest."""
-    return signals_of(np.tile(simulated(0.1, 1)[0][0], (len(road), 1)), road, commands)
 
 
 def test_refit_gives_back_what_the_log_was_made_with(model: RigModel) -> None:
