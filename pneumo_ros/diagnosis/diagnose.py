@@ -114,11 +114,13 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
 
 
 def _weighed(outcome: Outcome) -> tuple[EffectEvidence, ...]:
-    """The evidence of each effect with its share of what the refit leaves."""
+    """The evidence of each effect with what it holds of what the refit leaves, in all orders or as the last one."""
     nominal, refit = (outcome.runs[name].total ** 2 for name in ("nominal", "refit"))
     left = max(refit - total_floor(outcome.holdout) ** 2, 1e-12)
     shares = outcome.budget.effects
-    return tuple(replace(e, share=shares[e.law].value * nominal / left) for e in outcome.closable.effects)
+    return tuple(
+        replace(e, share=max(shares[e.law].value * nominal, e.without - e.own) / left) for e in outcome.closable.effects
+    )
 
 
 def _without_effects(outcome: Outcome) -> Outcome:

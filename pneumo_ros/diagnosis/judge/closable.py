@@ -36,7 +36,7 @@ class EffectEvidence:
     without : gap left when the effect is taken away and the rest fitted again
     own : gap left by the structure
     ceiling : gap left when whatever may act at its places is added
-    share : of what the refit leaves, averaged over the orders in which the effects can be added
+    share : what it holds of what the refit leaves
     """
 
     law: Part
