@@ -34,6 +34,7 @@ DISK_CHECK_EVERY = 4096  # messages
 BATCH_PERIOD = 0.05  # s between batches of the writing thread
 ROSBAG2_VERSION = 9
 PROFILE = "ros2"
+UNWRITTEN = 0  # number of a channel that the file system refused
 AT_STAMP = -1  # as a log time: the message's own header.stamp
 AT_LATEST = -2  # as a log time: that of the message before it
 
@@ -139,14 +140,17 @@ class LogWriter:
     def _register(
         self, topic: str, type_name: str, definition: str, type_hash: str, offered: list[dict[str, Any]]
     ) -> Channel:
-        schema = self._schemas.get(type_name)
-        if schema is None:
-            schema = self._schemas[type_name] = self._writer.add_schema(type_name, "ros2msg", definition.encode())
         described = {
             "offered_qos_profiles": yaml.safe_dump(offered, sort_keys=False),
             "topic_type_hash": type_hash,
         }
-        number = self._writer.add_channel(topic, "cdr", schema, described)
+        number = UNWRITTEN
+        try:
+            if type_name not in self._schemas:
+                self._schemas[type_name] = self._writer.add_schema(type_name, "ros2msg", definition.encode())
+            number = self._writer.add_channel(topic, "cdr", self._schemas[type_name], described)
+        except OSError as error:  # the session learns it from :attr:`stopped`, and goes on or ends as it is told to
+            self._stopped = self._stopped or f"the file system refused to write ({error})"
         self._channels[topic] = Channel(topic, type_name, offered, number)
         return self._channels[topic]
 
@@ -176,7 +180,7 @@ class LogWriter:
         counts = self._writer.counts
         result = Written(
             self.path,
-            {c.topic: counts[c.number] for c in self._channels.values()},
+            {c.topic: counts[c.number] for c in self._channels.values() if c.number != UNWRITTEN},
             *self._writer.span_ns,
             complete and not self._stopped,
             reason or self._stopped,
@@ -187,8 +191,8 @@ class LogWriter:
         own = yaml.safe_dump(description["rosbag2_bagfile_information"], sort_keys=False)
         self._attempt(lambda: self._writer.add_metadata("session", end))
         self._attempt(lambda: self._writer.add_metadata("rosbag2", {"serialized_metadata": own}))
-        self._attempt(self._writer.finish)
-        self._attempt(self._name)
+        if self._attempt(self._writer.finish):  # a file without its end keeps the name of an unfinished one
+            self._attempt(self._name)
         self._stream.close()
         if not self.path.exists():
             remedy = f"pneumo log recover {self.part.name} keeps what is readable"
@@ -199,12 +203,14 @@ class LogWriter:
             return replace(result, complete=False, reason=result.reason or self._stopped)
         return result
 
-    def _attempt(self, step: Callable[[], object]) -> None:
-        """A step that the file system may refuse: what is written stays, and the reason is kept."""
+    def _attempt(self, step: Callable[[], object]) -> bool:
+        """Whether a step that the file system may refuse was done: what is written stays, and the reason is kept."""
         try:
             step()
         except OSError as error:
             self._stopped = self._stopped or f"the file system refused to write ({error})"
+            return False
+        return True
 
     def _name(self) -> None:
         """Give the file its name; one whose folder was removed meanwhile is written again from what is still open."""
@@ -280,6 +286,7 @@ class LogWriter:
                 "message_count": written.counts[c.topic],
             }
             for c in self._channels.values()
+            if c.topic in written.counts
         ]
         information = {
             "version": ROSBAG2_VERSION,

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from helpers.folders import DOCS
 from helpers.rig_logs import noisy, simulated, write_log
+from helpers.small_logs import contract_log, write
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.diagnose import app
@@ -104,14 +105,15 @@ def test_inputs_that_throw_the_model_off_are_refused(tmp_path: Path) -> None:
 
 
 def test_an_output_that_cannot_be_written_is_said_before_the_work(tmp_path: Path) -> None:
-    """The logs do not even exist: the folder is looked at first."""
+    """The folder is looked at before anything is diagnosed."""
+    write(tmp_path / "nothing.mcap", contract_log(5))
     (tmp_path / "file").write_text("")
     for options in (
         ["-o", str(tmp_path / "file" / "out")],
         ["-o", str(tmp_path / "out"), "--save-rig", str(tmp_path / "file" / "rig.yaml")],
         ["-o", str(tmp_path / "out"), "--save-rig", str(tmp_path)],
     ):
-        done = CliRunner().invoke(app, ["nothing.mcap", *options])
+        done = CliRunner().invoke(app, [str(tmp_path / "nothing.mcap"), *options])
         assert isinstance(done.exception, InputError) and "nothing.mcap" not in str(done.exception)
 
 

@@ -122,6 +122,7 @@ samples = st.builds(
     Sample,
     u32,
     u32,
+    u32,
     st.sampled_from(frames.DeviceState),
     st.sampled_from(list(map(frames.SampleFlag, range(4)))),
     counts,

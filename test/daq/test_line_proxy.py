@@ -79,9 +79,9 @@ def test_two_hosts_on_one_board_arm_nothing_and_say_so() -> None:
 
 
 def test_the_nonce_of_a_handshake_is_not_that_of_another_session() -> None:
-    nonces = set()
+    nonces: list[int] = []
     for seed in range(8):
         witness = Witness(seed)
         witness.run(3)
-        nonces |= {r.nonce for f in witness.recorded[1] if isinstance(r := decode(f[:-1]), HelloRequest)}
-    assert len(nonces) == 8
+        nonces += {r.nonce for f in witness.recorded[1] if isinstance(r := decode(f[:-1]), HelloRequest)}
+    assert len(nonces) >= 8 and len(set(nonces)) == len(nonces)

@@ -19,7 +19,7 @@ from pneumo_ros.log.salvage import salvage
 from pneumo_ros.log.writing import LogWriter, Written
 
 COUNT = 3000
-LIMITS = (0, 1, 100, 2_000, 10_000, 20_000, 50_000, 99_999, 100_000, 131_072, 150_000, 170_000, 190_000, 200_000)
+LIMITS = (0, 1, 100, 2_000, 10_000, 20_000, 50_000, 99_999, 100_000, 131_072, 150_000, 160_000, 165_000, 170_000)
 
 
 def message(i: int, shift_ns: int = 0) -> bytes:
@@ -58,7 +58,7 @@ def test_a_limit_on_the_files_size_at_any_byte(tmp_path: Path, limit: int) -> No
         assert read_back(written) > 500
 
 
-@pytest.mark.parametrize("after", [0, 1, 2, 3])
+@pytest.mark.parametrize("after", [0, 1])
 def test_a_full_disk_that_gives_back_the_reserve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int) -> None:
     """ENOSPC at a write, in the middle of it; with the reserve gone there is room again: nothing recorded is lost."""
     reserve, calls, real = tmp_path / ".log.mcap.reserve", [0], FileIO.write
