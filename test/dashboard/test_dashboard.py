@@ -209,7 +209,7 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
         tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
         os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)
-        tab.wait(lambda: "stopped by the user" in tab.model("status", "text"), "the session's end", 60)
+        tab.wait(lambda: "cut short" in tab.model("status", "text"), "the session's end", 60)
         tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
         assert process.poll() is None and process.stdout is not None
         assert line_with("the dashboard stays", process.stdout, 60.0)
