@@ -148,10 +148,13 @@ def effect_in(path: Path) -> Effect:
         source = path.read_bytes()
         digest = hashlib.sha256(source).hexdigest()
         module = f"pneumo_effect_{re.sub(r'[^0-9A-Za-z_]', '_', path.stem)[:40]}_{digest[:20]}"
-        effect = getattr(module_at(module, str(kept(f"{module}.py", source))), "EFFECT", None)
+        copy = kept(f"{module}.py", source)
+        effect = getattr(module_at(module, str(copy)), "EFFECT", None)
         _ORIGINS[module] = Origin(path.resolve(), digest)
+    except OSError as error:
+        raise InputError(f"cannot load the effect ({error})", where=path, remedy=remedy) from error
     except Exception as error:
-        raise in_effect_file(error, path) from error
+        raise in_effect_file(error, path, copy) from error
     if not isinstance(effect, Effect):
         raise InputError("defines no EFFECT", where=path, remedy=remedy)
     for hook, wanted in HOOKS.items():

@@ -16,9 +16,9 @@ _UNEXPECTED = re.compile(r"(\w+)\.__init__\(\) got an unexpected keyword argumen
 _MISSING = re.compile(r"(\w+)\.__init__\(\) missing \d+ required .*arguments?: (.*)")
 
 
-def in_effect_file(error: Exception, path: Path) -> InputError:
-    """What is wrong with the file, from what loading it raised."""
-    line = line_of(error, path)
+def in_effect_file(error: Exception, path: Path, copy: Path) -> InputError:
+    """What is wrong with the file, from what loading its copy raised."""
+    line = line_of(error, copy)
     where = f"{path}:{line}" if line is not None else path
     unexpected, missing = _UNEXPECTED.search(str(error)), _MISSING.search(str(error))
     if unexpected is not None:

@@ -20,6 +20,7 @@ from pneumo_ros.diagnosis.half_car.saved_rig import corrected_rig, save_correcte
 from pneumo_ros.diagnosis.judge.held_out_runs import held_out
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap
 from pneumo_ros.diagnosis.signals import Signals, check_pair
+from pneumo_ros.effects import library
 from pneumo_ros.effects.corrected_rig import CorrectedRig, diagnosed_rig
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
@@ -162,7 +163,7 @@ def test_an_effect_of_ones_own_travels_as_a_file_beside_the_rig(record: Signals,
     """Saved with its source beside the rig file; a log has id and hash only, and asks for the file."""
     file = tmp_path / "own" / "tilted.py"
     file.parent.mkdir()
-    source = Path(str(LIBRARY["lvdt_offset"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
+    source = Path(library.__path__[0], "lvdt_offset.py").read_text()
     file.write_text(source.replace('id="lvdt_offset"', 'id="tilted"'))
     model = RigModel(NOMINAL, load_library([file]))
     found = found_in(model, np.array([p.nominal for p in model.parameters]), Active("tilted", "sprung_rear", (1e-3,)))

@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.effects import app
 from pneumo_ros.effects.guide import displayed
-from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.sheet import check_words, effects_page
 from pneumo_ros.errors import InputError
 
-LIBRARY = load_library()
+LIBRARY = laws_of(load_library())
 HEAD = (
     "from pneumo_ros.effects.contract import ENDS, Effect\nfrom pneumo_ros.effects.parameters import EffectParameter\n"
 )

@@ -17,6 +17,7 @@ from helpers.small_logs import text
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.main import app
+from pneumo_ros.effects import library
 from pneumo_ros.effects.cache import cache_folder, kept
 from pneumo_ros.effects.configured import library_of, standing_effects, with_files
 from pneumo_ros.effects.loading import load_library, origin_of, origins
@@ -26,13 +27,13 @@ from pneumo_ros.rig import NamedEffect, load_rig, parse_rig
 from pneumo_ros.session.replay import replay
 
 LIBRARY = load_library()
-SOURCE = Path(str(LIBRARY["lvdt_offset"].outputs.__code__.co_filename)).read_text()  # type: ignore[union-attr]
+SOURCE = Path(library.__path__[0], "lvdt_offset.py").read_text()
 OWN = SOURCE.replace('id="lvdt_offset"', 'id="tilted"')
 
 
 def config(**entry: object) -> str:
     """/rig/config that names an effect."""
-    effect = {"effect": "tilted", "site": "sprung_rear", "parameters": {"lvdt_offset": 1e-3}, **entry}
+    effect = {"effect": "tilted", "site": "sprung_rear", "parameters": {"offset": 1e-3}, **entry}
     return yaml.safe_dump({**yaml.safe_load(load_rig().to_yaml()), "effects": [effect]})
 
 
@@ -41,7 +42,7 @@ def trap(tmp_path: Path) -> tuple[Path, Path]:
     """A Python file that leaves a mark when it is executed, and the mark."""
     mark, file = tmp_path / "executed", tmp_path / "elsewhere" / "tilted.py"
     file.parent.mkdir()
-    file.write_text(f"import pathlib\npathlib.Path({str(mark)!r}).write_text('!')\n{OWN}")
+    file.write_text(f"{OWN}\nimport pathlib\npathlib.Path({str(mark)!r}).write_text('!')\n")
     return file, mark
 
 
@@ -74,7 +75,7 @@ def test_a_rig_file_beside_a_bag_and_a_valve_profile_of_a_log_are_not_opened(
     bag.mkdir()
     (bag / "rig.yaml").write_text(config(file=file.name))
     setup = {"node": "controller", "parameters": {"controller": "profile", "valve_profile": "/dev/zero"}}
-    message = ("/rig/parameters", STRING, 0, text(yaml.safe_dump(setup)))
+    message = ("/rig/setup", STRING, 0, text(yaml.safe_dump(setup)))
     rest_log(bag / "part.mcap", load_rig().to_yaml(), extra=[message])
     log = read_log(bag)
     assert log.config == load_rig() and not mark.exists()
@@ -91,9 +92,9 @@ def test_the_users_own_file_loads_from_beside_the_rig_file_with_its_path_shown(
     rig_file.write_text(config(file=file.name, source=digest))
     rig = load_rig(rig_file)
     assert rig.effects[0].file == str(file.resolve()) and not mark.exists()
-    library = library_of(rig)
-    assert mark.exists() and standing_effects(rig, library)[0].effect == "tilted"
-    assert origins(library) == [f"effect tilted is loaded from {file.resolve()} (SHA-256 {digest[:16]})"]
+    effects = library_of(rig)
+    assert mark.exists() and standing_effects(rig, effects)[0].effect == "tilted"
+    assert origins(effects) == [f"effect tilted is loaded from {file.resolve()} (SHA-256 {digest[:16]})"]
     published = rig.to_yaml()
     assert str(tmp_path) not in published and "file" not in published and digest in published
     assert parse_rig(published) == rig
@@ -122,7 +123,7 @@ def test_another_source_than_the_recorded_one_is_refused(tmp_path: Path) -> None
     rig = with_files(parse_rig(config(source=digest)), [file])
     with pytest.raises(InputError, match=f"another than the one that was recorded.*allowed: SHA-256 {digest[:16]}"):
         standing_effects(rig, library_of(rig))
-    known = NamedEffect("lvdt_offset", "sprung_rear", (("lvdt_offset", 1e-3),), digest)
+    known = NamedEffect("lvdt_offset", "sprung_rear", (("offset", 1e-3),), digest)
     with pytest.raises(InputError, match='value "the package\'s own"'):
         standing_effects(parse_rig(yaml.safe_dump({**yaml.safe_load(load_rig().to_yaml()),
                                                    "effects": [known.to_dict()]})), LIBRARY)  # fmt: skip

@@ -166,8 +166,8 @@ BOMBS: dict[str, Callable[[Path], Path]] = {
     "1 GiB text": long_text,
     "metadata of 2^32": lambda p: file(p, record(12, prefixed(b"m") + struct.pack("<I", 2**32 - 1) + b"x")),
     "aliases in the rig": lambda p: rest_log(p, aliases(), 5),
-    "aliases in parameters": lambda p: log_with(p, "/rig/parameters", aliases()),
-    "deep YAML": lambda p: log_with(p, "/rig/parameters", "[" * 100_000),
+    "aliases in parameters": lambda p: log_with(p, "/rig/setup", aliases()),
+    "deep YAML": lambda p: log_with(p, "/rig/setup", "[" * 100_000),
     "deep JSON as the rig": lambda p: rest_log(p, '{"rig":' * 100_000, 5),
 }  # fmt: skip
 """Name -> what writes it."""

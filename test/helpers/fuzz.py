@@ -48,7 +48,7 @@ SETUP = yaml.safe_dump({"node": "controller", "parameters": {"controller": "smfl
 def base_log() -> bytes:
     """A small log of the contract, with parameters."""
     with TemporaryDirectory() as folder:
-        extra = [("/rig/parameters", STRING, 0, text(SETUP))]
+        extra = [("/rig/setup", STRING, 0, text(SETUP))]
         return rest_log(Path(folder) / "base.mcap", RIG.to_yaml(), 12, extra).read_bytes()
 
 

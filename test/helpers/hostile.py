@@ -75,7 +75,7 @@ def hostile_log(path: Path, count: int = 200) -> Path:
         setup = yaml.safe_dump({"node": hostile, "parameters": {hostile: hostile}})
         extra += [
             ("/rig/events", "diagnostic_msgs/msg/DiagnosticArray", time, events),
-            ("/rig/parameters", STRING, time, text(setup)), (f"/{i}{hostile}", STRING, time, text(hostile)),
+            ("/rig/setup", STRING, time, text(setup)), (f"/{i}{hostile}", STRING, time, text(hostile)),
             (f"/j{i}", JOINT_STATE, time, joint(time, (1.0,), (hostile,))),
         ]  # fmt: skip
     rig = yaml.safe_load(RIG.to_yaml())
