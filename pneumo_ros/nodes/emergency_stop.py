@@ -41,7 +41,10 @@ def hear_stops(node: Node, trip: Callable[[str], None]) -> None:
 
     def subscribe(profile: QoSProfile, events: SubscriptionEventCallbacks) -> object:
         kind = message_class(ESTOP.type)
-        return node.create_subscription(kind, ESTOP.relative, on_message, profile, event_callbacks=events, raw=True)
+        # No overrides: two subscriptions share the topic's parameters, and none may keep a stop from being heard.
+        return node.create_subscription(
+            kind, ESTOP.relative, on_message, profile, event_callbacks=events, raw=True, qos_overriding_options=None
+        )
 
     def on_matched(_: object) -> None:
         there = [info.qos_profile for info in node.get_publishers_info_by_topic(ESTOP.relative)]
