@@ -184,7 +184,7 @@ class RigNode(Node):
         if not hasattr(self, "lockstep"):  # rclpy's own, while the node is being made
             return super().create_publisher(*args, **options)
         options.setdefault("qos_overriding_options", overriding(self.lockstep))
-        with refused_overrides(self.get_name(), args[1]):
+        with refused_overrides(self.get_name(), self.resolve_topic_name(args[1])):
             return super().create_publisher(*args, **options)
 
     def create_subscription(self, *args: Any, **options: Any) -> Subscription:
@@ -192,7 +192,7 @@ class RigNode(Node):
         if not hasattr(self, "lockstep"):
             return super().create_subscription(*args, **options)
         options.setdefault("qos_overriding_options", overriding(self.lockstep))
-        with refused_overrides(self.get_name(), args[1]):
+        with refused_overrides(self.get_name(), self.resolve_topic_name(args[1])):
             return super().create_subscription(*args, **options)
 
     def steady_timer(self, period: float, callback: Callable[[], None]) -> Timer:
