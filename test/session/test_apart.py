@@ -131,7 +131,11 @@ def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_p
 
 
 @pytest.mark.parametrize("there", ["sim, a.mcap", "serial, a.mcap"])
-@pytest.mark.parametrize("options", [(), ("--source", "serial", "--port", "/dev/null")], ids=["sim", "serial"])
+@pytest.mark.parametrize(
+    "options",
+    [(), ("--source", "serial", "--port", "/dev/null", "--calibration", "appendix_c_corrected")],
+    ids=["sim", "serial"],
+)
 def test_neither_kind_of_session_starts_beside_the_other(tmp_path: Path, there: str, options: tuple[str, ...]) -> None:
     domain = sessions.own_domain()
     claim = Claim(domain, "", there)
