@@ -71,7 +71,7 @@ def diagnose(
 ) -> None:
     """Diagnose the sim-to-real gap of a log: where it lies, which unmodelled effect causes it, how far it shrinks.
 
-    12 to 16 s of one core for two logs of 15 s at 500 Hz. Exit code 0 whatever the verdict, 2 for logs, rigs or effects
+    About 20 s of one core for two logs of 15 s at 500 Hz with one effect, longer with several. Exit code 0 whatever the verdict, 2 for logs, rigs or effects
     that cannot be used. Gaps are RMS of log minus free-running model over the log's standard deviation, all channels.
     """
     console = Console()
