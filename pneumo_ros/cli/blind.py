@@ -40,7 +40,7 @@ def make(
 ) -> None:
     """Draw the cases of a set, write their logs, seal their labels.
 
-    Finished cases are kept: the same command goes on after an interruption. A case takes about 12 s of one core.
+    Finished cases are kept: the same command goes on after an interruption. A case takes about 17 s of one core.
     """
     from pneumo_ros.casemaker.plan import plan
     from pneumo_ros.cli.blind_work import make_case
