@@ -71,9 +71,9 @@ def diagnose(
 ) -> None:
     """Diagnose the sim-to-real gap of a log: where it lies, which unmodelled effect causes it, how far it shrinks.
 
-    About 20 s of one core for two logs of 15 s at 500 Hz with one effect, longer with several. Exit code 0 whatever the
-    verdict, 2 for logs, rigs or effects that cannot be used. Gaps are RMS of log minus free-running model over the log's
-    standard deviation, all channels.
+    About 20 s of one core for two logs of 15 s at 500 Hz with one effect, longer with several. Exit code 0 whatever
+    the verdict, 2 for logs, rigs or effects that cannot be used. Gaps are RMS of log minus free-running model over the
+    log's standard deviation, all channels.
     """
     console = Console()
     if tables:
