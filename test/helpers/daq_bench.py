@@ -118,10 +118,11 @@ class Bench:
     def healthy(self) -> DaqNode:
         """Configured, and nothing but a stop would speak against arming."""
         node = self.configure()
-        if node.driver is not None and node.driver.core.mode is Mode.ESTOP:
-            self.reset()  # the board remembers the test before
         assert node.driver is not None
         core = node.driver.core
+        self.until(lambda: core.last is not None, "a sample, which tells the board's state")
+        if core.mode is Mode.ESTOP:
+            self.reset()  # the board remembers the test before
         self.until(lambda: not core.blockers(time.monotonic_ns()), "a healthy rig")
         return node
 
