@@ -6,6 +6,7 @@ READY := $(VENV)/.ready
 
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
+export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: demo test lint types unit colcon floors headers bench docs blind blind-ci lock clean help
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -104,7 +105,7 @@ def diagnose(
     if own is not None:
         tell_assumed(console, own, rig)
     task = prepared(fit, holdout, own, edit, effect or (), without or ())
-    options = Options(pairs=pairs, experiment=design_experiment)
+    options = Options(pairs=pairs, experiment=design_experiment, threads=os.cpu_count() or 1)
     with _bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))

@@ -11,6 +11,10 @@ from types import FrameType
 
 INTERRUPTED = 130  # exit code, as a shell says of Ctrl-C
 
+# Before numpy is loaded, here and in every process that is started: our matrices are small, and the threads of a BLAS
+# then spin for longer than they compute. A diagnosis takes three times the processor, a node misses its periods.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 def _stopped(number: int = signal.SIGINT, frame: FrameType | None = None) -> None:
     os.write(2, b"stopped by the user\n")

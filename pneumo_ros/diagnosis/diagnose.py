@@ -50,6 +50,7 @@ class Options:
     locate : (model, fit logs, held-out log, nuisance or None for nominal, active) -> :class:`Whereabouts` of what that
         structure leaves
     experiment : design the experiment that splits an ambiguity group
+    threads : simulations at a time
     """
 
     pairs: bool = True
@@ -58,6 +59,7 @@ class Options:
     calibration: Calibration = field(default_factory=Calibration)
     locate: Locate | None = None
     experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None
+    threads: int = 1
 
 
 def diagnose(
@@ -80,7 +82,7 @@ def diagnose(
     """
     options = options or Options()
     tell = progress or (lambda share, what: None)
-    contest = compete(Problem(model, tuple(fit_logs)), options.effort, options.pairs, tell)
+    contest = compete(Problem(model, tuple(fit_logs), threads=options.threads), options.effort, options.pairs, tell)
     grow(contest, options.limits, options.pairs)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)

@@ -140,7 +140,7 @@ def diverged(x: State) -> bool:
     return not (abs(x[0]) < 1.0 and abs(x[1]) < 2.0 and x[8] > 1e3 and x[9] > 1e3)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def simulate(
     x0: Array,
     commands: Array,

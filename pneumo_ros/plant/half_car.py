@@ -260,7 +260,7 @@ def _combined(a: State, b: State, c: State, d: State) -> State:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def simulate(
     x0: NDArray[np.float64],
     commands: NDArray[np.float64],

@@ -7,10 +7,11 @@ every log in prior sigmas, effect values in their typical sizes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ BLOCK = 1.25  # s, length of a time block
 SELECT_EVERY = 3  # of so many blocks in turn, one is kept from the fit and used for selection
 
 Part = tuple[str, str]  # effect id, site
+Item = TypeVar("Item")
+Done = TypeVar("Done")
 
 
 @dataclass(frozen=True)
@@ -62,13 +65,19 @@ class Problem:
     records : logs to fit
     averaged : log samples in one fit sample
     turn : which of every :data:`SELECT_EVERY` blocks is kept from the fit
+    threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
     """
 
     model: Model
     records: tuple[Any, ...]
     averaged: int = AVERAGED
     turn: int = SELECT_EVERY - 1
+    threads: int = 1
     _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
+
+    def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
+        """``work`` done on each item, in their order, several at a time."""
+        return list(_pool(self.threads).map(work, items)) if self.threads > 1 else [work(item) for item in items]
 
     @cached_property
     def states(self) -> int:
@@ -226,6 +235,11 @@ class Problem:
     def residual(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) measured - predicted, in sigmas."""
         return (self.measured - self.predict(candidate, x)) * self.weight
+
+
+@lru_cache(maxsize=2)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, "simulation")
 
 
 def form_of(record: Any) -> float:

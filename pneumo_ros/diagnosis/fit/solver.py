@@ -25,6 +25,7 @@ STEP = 2e-3  # forward difference in scaled units: short, so that what nothing c
 CENTRAL = 2e-3  # half width of the central differences
 TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
 NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
+KEPT = 0.3  # share of the promised gain from which sensitivities are carried on by a secant rather than taken anew
 COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
 START_DAMPING, MOST_DAMPING = 1e-4, 1e6
 
@@ -100,21 +101,40 @@ def fit(
         return state
     shared = problem.fixed if shared is None else shared
     borrowed = None if jacobian is None else jacobian[:, :, :shared]
+    columns: Array | None = None  # None: to be taken anew
     damping, failed = START_DAMPING, False
     for _ in range(iterations):
-        columns = _jacobian(problem, state, borrowed)
-        state = replace(state, jacobian=columns, simulations=state.simulations + _spent(columns, borrowed))
-        better, damping = _step(problem, state, rows, bounds, damping)
-        gained, moved = state.cost - better.cost, float(np.max(np.abs(better.x - state.x)))
+        anew = columns is None
+        if columns is None:
+            columns = _jacobian(problem, state, borrowed)
+            state = replace(state, simulations=state.simulations + _spent(columns, borrowed))
+        state = replace(state, jacobian=columns)
+        better, damping, promised = _step(problem, state, rows, bounds, damping)
+        gained, moved = state.cost - better.cost, better.x - state.x
+        kept_promise = gained >= TOLERANCE and gained > KEPT * promised
+        columns = secant(columns, moved, better.residual - state.residual) if gained >= TOLERANCE else columns
         state = replace(better, jacobian=columns)
+        if kept_promise:
+            continue
         if gained < TOLERANCE:
-            if borrowed is None or failed or probe:
+            if (anew and borrowed is None) or failed or probe:
                 break
-            failed = True
+            failed, damping = anew, START_DAMPING
         if not probe:
-            borrowed = columns[:, :, :shared] if moved < NEAR and gained >= TOLERANCE else None
-        damping = damping if gained >= TOLERANCE else START_DAMPING
+            near = gained >= TOLERANCE and np.max(np.abs(moved)) < NEAR
+            borrowed = columns[:, :, :shared] if near else None
+        columns = None
     return state
+
+
+def secant(columns: Array, moved: Array, change: Array) -> Array:
+    """Sensitivities (n, C, m) brought up to date by a step (m,) and the change of the residual it made (n, C).
+
+    The smallest correction that reproduces the step (Broyden 1965, Math. Comp. 19, 577-593, update 4.5); it costs no
+    simulation.
+    """
+    wrong = change - columns @ moved
+    return np.asarray(columns + wrong[:, :, None] * (moved / (moved @ moved)))
 
 
 def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
@@ -134,12 +154,16 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     if borrowed is not None:
         columns[:, :, :first] = borrowed
     here = problem.predict_coarse(state.candidate, state.x)
-    for m in range(first, len(state.x)):
+
+    def column(m: int) -> Array:
         step = STEP if state.x[m] + STEP <= high[m] else -STEP
         moved = state.x.copy()
         moved[m] += step
-        column = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
-        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+        change = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
+        return np.where(np.isfinite(change), change, 0.0)
+
+    for m, change in enumerate(problem.each(column, range(first, len(state.x))), first):
+        columns[:, :, m] = change
     return columns
 
 
@@ -147,17 +171,25 @@ def sensitivities(problem: Problem, state: Fit) -> Fit:
     """The fit with central differences of the full model: for what is reported, where degenerate directions matter."""
     columns = np.empty((*state.residual.shape, len(state.x)))
     low, high = problem.bounds(state.candidate)
-    for m in range(len(state.x)):
+
+    def column(m: int) -> Array:
         ends = [float(np.clip(state.x[m] + s, low[m], high[m])) for s in (CENTRAL, -CENTRAL)]
         one = np.arange(len(state.x)) == m
         up, down = (problem.residual(state.candidate, np.where(one, end, state.x)) for end in ends)
-        column = (up - down) / (ends[0] - ends[1])
-        columns[:, :, m] = np.where(np.isfinite(column), column, 0.0)
+        change = (up - down) / (ends[0] - ends[1])
+        return np.where(np.isfinite(change), change, 0.0)
+
+    for m, change in enumerate(problem.each(column, range(len(state.x)))):
+        columns[:, :, m] = change
     return replace(state, jacobian=columns)
 
 
-def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float) -> tuple[Fit, float]:
-    """The first of a few ever more damped steps that gains."""
+def _step(
+    problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float
+) -> tuple[Fit, float, float]:
+    """The first of a few ever more damped steps that gains, the next damping, and the gain that the sensitivities
+    promised.
+    """
     low, high = bounds
     H, g = normal_equations(problem, state, rows)
     for _ in range(5):
@@ -166,10 +198,10 @@ def _step(problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array],
             break
         trial = _evaluate(problem, state.candidate, state.x + move, rows, state.simulations)
         if trial.cost < state.cost:
-            return trial, max(damping / 10.0, 1e-6)
+            return trial, max(damping / 10.0, 1e-6), float(-2.0 * g @ move - move @ H @ move)
         state = replace(state, simulations=trial.simulations)
         damping = min(damping * 30.0, MOST_DAMPING)
-    return state, damping
+    return state, damping, 0.0
 
 
 def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, Array]:

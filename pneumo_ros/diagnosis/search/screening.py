@@ -72,16 +72,18 @@ def all_parts(problem: Problem) -> list[Part]:
 
 def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
     """Simulate each part at each start on top of a fit; what diverges or moves nothing is left out."""
-    out = []
     own = list(problem.values(base.candidate, base.x))
-    for part in parts:
+
+    def tried(what: tuple[Part, tuple[float, ...]]) -> Trial | None:
+        part, values = what
         candidate = Candidate((*base.candidate.parts, part))
-        for values in start_values(problem.model.effects[part[0]].parameters):
-            x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
-            change = problem.residual(candidate, x) - base.residual
-            if np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6:
-                out.append(Trial(part, values, change))
-    return out
+        x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
+        change = problem.residual(candidate, x) - base.residual
+        seen = np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6
+        return Trial(part, values, change) if seen else None
+
+    starts = [(p, v) for p in parts for v in start_values(problem.model.effects[p[0]].parameters)]
+    return [trial for trial in problem.each(tried, starts) if trial is not None]
 
 
 def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[Promise]:
