@@ -167,6 +167,11 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
     return columns
 
 
+def refreshed(problem: Problem, state: Fit) -> Fit:
+    """The fit with its sensitivities taken anew where it ended: what others are screened and started by."""
+    return state if state.diverged else replace(state, jacobian=_jacobian(problem, state, None))
+
+
 def sensitivities(problem: Problem, state: Fit) -> Fit:
     """The fit with central differences of the full model: for what is reported, where degenerate directions matter."""
     columns = np.empty((*state.residual.shape, len(state.x)))

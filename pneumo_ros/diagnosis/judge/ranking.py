@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
-from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, effect_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, held_by
@@ -17,7 +17,6 @@ from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Ranked
-from pneumo_ros.diagnosis.search.competition import with_jacobian
 from pneumo_ros.diagnosis.search.selection import Scored
 from pneumo_ros.effects.parameters import Active, family_of
 
@@ -33,7 +32,7 @@ def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
     for scored in outcome.finalists:
         same = best is not base and scored.fit.candidate == best.candidate
-        one = best if same else with_jacobian(problem, scored.fit)
+        one = best if same else refreshed(problem, scored.fit)
         run = outcome.runs["best"] if same else held_by(problem, one, holdout)
         ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
         out.append(replace(ranked, evidence=_weighed(scored)))

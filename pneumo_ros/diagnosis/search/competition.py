@@ -19,13 +19,13 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
-from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.screening import Promise, all_parts, compatible, promises, trials, visibility
 from pneumo_ros.diagnosis.search.selection import FORM, TOLL, Thresholds, noise_level, score, used_unknowns
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.errors import InputError
 
-PROBE = 3  # steps of a probe
+PROBE = 5  # steps of a probe
 LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
 NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
@@ -55,9 +55,9 @@ class Effort:
     pair_finalists: int = 3
     probes: int = 24
     exchanged: int = 6
-    short: int = 3
+    short: int = 6
     anew: int = 5
-    long: int = 8
+    long: int = 10
 
 
 @dataclass
@@ -186,6 +186,7 @@ def _time_jumps(contest: Contest) -> None:
 def _run_singles(contest: Contest) -> None:
     effort, problem = contest.effort, contest.problem
     contest.progress(0.05, "screening effects")
+    contest.refit = refreshed(problem, contest.refit)
     found = trials(problem, contest.refit, all_parts(problem))
     contest.promised = promises(problem, contest.refit, found)
     contest.visible = visibility(problem, contest.refit, found)
@@ -210,9 +211,9 @@ def _run_pairs(contest: Contest) -> None:
 
     short: list[Fit] = []
     for k, (single, count) in enumerate(zip(contest.singles, effort.seconds, strict=False)):
-        leader = with_jacobian(problem, single)
+        leader = refreshed(problem, single)
         part = leader.candidate.parts[0]
-        others = [p for p in all_parts(problem) if compatible((part, p))]
+        others = [p for p in all_parts(problem) if compatible(problem.model, part, p)]
         promised = promises(problem, leader, trials(problem, leader, others))
         promised = probed(problem, leader, varied(promised, effort.probes, 3))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
@@ -236,10 +237,10 @@ def _exchange_each(contest: Contest) -> None:
     pair = contest.pairs[0]
     for k, part in enumerate(pair.candidate.parts):
         kept = pair.candidate.parts[1 - k]
-        alone = fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1)
-        if alone.jacobian is None:  # it diverges without the other effect
+        alone = refreshed(problem, fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1))
+        if alone.diverged:  # without the other effect
             continue
-        rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible((kept, p))]
+        rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible(problem.model, kept, p)]
         tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
         promised = promises(problem, alone, trials(problem, alone, rivals))
         fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
@@ -358,11 +359,6 @@ def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> lis
         other = [value for value in (p.typical, *p.starts) if value * found[k] < 0.0][:1]
         out += [[value if m == k else q.typical for m, q in enumerate(parameters)] for value in other]
     return out
-
-
-def with_jacobian(problem: Problem, state: Fit) -> Fit:
-    """The fit with its sensitivities."""
-    return state if state.jacobian is not None else fit(problem, state.candidate, state.x, iterations=1)
 
 
 def _by_cost(fits: Iterable[Fit]) -> list[Fit]:

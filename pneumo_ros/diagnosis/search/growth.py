@@ -14,7 +14,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.competition import Contest, probed, room_for_more, short_fits, varied
 from pneumo_ros.diagnosis.search.screening import all_parts, compatible, promises, trials
@@ -24,7 +24,11 @@ from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 MOST = 6  # effects in a structure
 SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
 SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
-PROBED, SHORT, FINISHED = 10, 3, 2  # further effects probed, fitted shortly, fitted to the end
+COUNTS = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end
+EXCHANGED = (8, 1, 1)  # the same for each effect that is exchanged
+TURNS = 10  # additions and exchanges at most
+STRANGE = 4.0  # mean square on the kept blocks, sigmas: above it something is missing that no addition may help
+WORTH = 8.0  # of the cost with its tolls: what a turn must gain
 STEPS = 5
 IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
 
@@ -35,18 +39,63 @@ def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
     for found, count in zip((contest.singles, contest.pairs), SHAPED, strict=True):
         contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
     best = _selected(contest, limits)
-    while further and 0 < best.size < MOST and room_for_more(contest):
-        contest.progress(0.84 + 0.01 * best.size, f"beside {best.fit.candidate.label}")
-        contest.structures += _one_more(contest, best.fit)
-        better = _selected(contest, limits)
-        if better.size <= best.size:
-            break
-        best = better
+    if further and best.size and room_for_more(contest):
+        _climb(contest, best.fit)
+        best = _selected(contest, limits)
     if best.size > 1:
         _refine(contest, best, limits)
     best = _selected(contest, limits)
     if best.size and best.fit.candidate.shapes:
         contest.structures.append(_without_idle_shapes(contest, best.fit))
+
+
+def _climb(contest: Contest, start: Fit) -> None:
+    """Structures of ever more effects, by floating search (Pudil, Novovicova, Kittler 1994, Pattern Recognition Letters
+    15, 1119-1125): after each addition, an effect that the others have made needless goes, and what has room then may
+    come; where no addition helps, one is exchanged.
+    """
+    problem = contest.problem
+
+    def price(one: Fit) -> float:
+        return score(problem, one).price
+
+    current, known = start, {len(start.candidate.laws): price(start)}
+    for turn in range(TURNS):
+        contest.progress(0.84 + 0.05 * turn / TURNS, f"beside {current.candidate.label}")
+        size = len(current.candidate.laws)
+        found = _one_more(contest, current) if size < MOST else []
+        if not found or min(map(price, found)) > price(current) - WORTH:
+            found = _one_exchanged(contest, current) if score(problem, current).level > STRANGE else []
+        if not found:
+            break
+        contest.structures += found
+        current = min(found, key=price)
+        size = len(current.candidate.laws)
+        known[size] = min(price(current), known.get(size, np.inf))
+        less = _one_less(problem, current) if size > 2 else None
+        if less is not None and price(less) < known.get(size - 1, np.inf) - WORTH:
+            contest.structures.append(less)
+            current, known[size - 1] = less, price(less)
+        if not room_for_more(contest):
+            break
+
+
+def _one_less(problem: Problem, found: Fit) -> Fit | None:
+    """The structure without the effect that it misses least, of those it had before the latest."""
+    without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws[:-1]]
+    best = min(without, key=lambda one: one.cost)
+    return None if best.diverged else reduced(problem, best, (), STEPS)
+
+
+def _one_exchanged(contest: Contest, found: Fit) -> list[Fit]:
+    """The structure with one of its effects exchanged for what helps more, those it misses least first."""
+    problem = contest.problem
+    without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws]
+    for bare in sorted((one for one in without if not one.diverged and one.candidate.laws), key=lambda one: one.cost):
+        other = _one_more(contest, bare, EXCHANGED)
+        if other and score(problem, other[0]).price < score(problem, found).price - WORTH:
+            return other
+    return []
 
 
 def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
@@ -97,17 +146,16 @@ def _selected(contest: Contest, limits: Thresholds) -> Scored:
     return select(score(problem, contest.refit), [score(problem, f) for f in contest.finalists], limits)
 
 
-def _one_more(contest: Contest, base: Fit) -> list[Fit]:
-    """The best structures with one more effect."""
+def _one_more(contest: Contest, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
+    """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end."""
     problem, effort = contest.problem, contest.effort
     laws = base.candidate.laws
-    others = [p for p in all_parts(problem) if all(compatible((law, p)) for law in laws)]
-    leader = base if base.jacobian is not None else fit(problem, base.candidate, base.x, iterations=1)
-    promised = varied(promises(problem, leader, trials(problem, leader, others)), PROBED, 2)
-    chosen = probed(problem, leader, promised)[:SHORT]
-    span = (0.84 + 0.01 * len(laws), 0.85 + 0.01 * len(laws))
-    short = short_fits(contest, leader, chosen, span)
-    ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.short) for one in short[:FINISHED]]
+    others = [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
+    leader = refreshed(problem, base)
+    promised = varied(promises(problem, leader, trials(problem, leader, others)), counts[0], 2)
+    chosen = probed(problem, leader, promised)[: counts[1]]
+    short = short_fits(contest, leader, chosen, (0.86, 0.86))
+    ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long) for one in short[: counts[2]]]
     return [with_shapes(problem, one, effort.short) for one in ended]
 
 
@@ -117,7 +165,7 @@ def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
     for law in found.candidate.laws:
         own = of_law(found.candidate, law)
         bare = reduced(problem, found, own, iterations=2)
-        if bare.diverged or bare.jacobian is None:
+        if bare.diverged:
             continue
         found = _exchanged(contest, found, bare, law)
     for law in found.candidate.laws:
@@ -139,8 +187,13 @@ def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
 def _exchanged(contest: Contest, found: Fit, bare: Fit, law: Part) -> Fit:
     """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
     problem, effort = contest.problem, contest.effort
+    bare = refreshed(problem, bare)
     others = bare.candidate.laws
-    rivals = [p for p in all_parts(problem) if _rival(problem, law, p) and all(compatible((o, p)) for o in others)]
+    rivals = [
+        p
+        for p in all_parts(problem)
+        if _rival(problem, law, p) and all(compatible(problem.model, o, p) for o in others)
+    ]
     promised = promises(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(contest, bare, probed(problem, bare, promised)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)

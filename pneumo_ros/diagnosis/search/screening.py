@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
-from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.effects.parameters import Active, EffectParameter, family_of, is_law
 
+SENSOR = "sensor:"  # how the contract's places of sensors begin
 SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
 
 
@@ -126,17 +128,22 @@ def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, 
         if share[k] <= 0.0:
             break
         parts = tuple(found[m].part for m in members[k])
-        if parts in best or (pairs and not compatible(parts)):
+        if parts in best or (pairs and not compatible(problem.model, *parts)):
             continue
         values = [_scaled(problem, found[m], s) for m, s in zip(members[k], sizes[k], strict=True)]
         best[parts] = Promise(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
     return list(best.values())
 
 
-def compatible(parts: tuple[Part, ...]) -> bool:
-    """Two sites of one effect only where they do not overlap."""
-    (first, site), (second, other) = parts
-    return family_of(first) != family_of(second) or (site != other and "both" not in (site, other))
+def compatible(model: Model, one: Part, other: Part) -> bool:
+    """Whether two effects may act together: two sites of one family only where they do not overlap, and one sensor's.
+
+    A load that nobody knows of moves body and axle alike, and a resonance all of them: two sensor errors at once are
+    what almost anything else looks like, so that a second one waits until the first has been mended.
+    """
+    if all(model.places(Active(*part, ()))[0].startswith(SENSOR) for part in (one, other)):
+        return False
+    return family_of(one[0]) != family_of(other[0]) or (one[1] != other[1] and "both" not in (one[1], other[1]))
 
 
 def _signed(problem: Problem, trial: Trial) -> bool:
