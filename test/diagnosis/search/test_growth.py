@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Structures of many effects, on a model whose outputs are sums of known signals: what is found is known exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import fit, refreshed, secant
+from pneumo_ros.diagnosis.model import PlainEffect
+from pneumo_ros.diagnosis.search.competition import Effort, compete
+from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.screening import compatible
+from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
+
+ROWS, PERIOD = 4000, 5e-3
+RNG = np.random.default_rng(11)
+TIME = np.arange(ROWS) * PERIOD
+FREQUENCIES = {"a": 0.9, "b": 1.7, "c": 2.6, "d": 3.8, "other": 5.2, "drive": 0.4}  # Hz
+SIGNALS = {name: np.sin(2.0 * np.pi * f * TIME + RNG.uniform(0.0, 6.0)) for name, f in FREQUENCIES.items()}
+TRUE = ("a", "b", "c", "d")
+SIGNALS["decoy"] = sum(SIGNALS[name] for name in TRUE) + 0.4 * SIGNALS["other"]  # looks better than any of them alone
+
+
+@dataclass(frozen=True)
+class Made:
+    """What the sum of the true signals looks like."""
+
+    name: str
+    measured: Array
+    period: float = PERIOD
+
+    @property
+    def weight(self) -> Array:
+        return np.ones_like(self.measured)
+
+    @property
+    def noise(self) -> Array:
+        return np.array([0.02])
+
+
+def _effects() -> dict[str, PlainEffect]:
+    size = (EffectParameter("size", "1", -5.0, 5.0, 0.3, size=True),)
+    out = {name: PlainEffect(name, ("",), size) for name in (*TRUE, "decoy")}
+    return out | {name: PlainEffect(name, ("left", "right", "both"), size) for name in ("gauge", "scale")}
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Output: gain times the drive and the active signals."""
+
+    channels: tuple[str, ...] = ("y",)
+    parameters: tuple[Parameter, ...] = (Parameter("gain", "1", 1.0, 0.1),)
+    effects: Mapping[str, PlainEffect] = field(default_factory=_effects)
+
+    def initial(self, record: Made, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+        return np.zeros(1), np.full(1, 1e-3)
+
+    def predict(
+        self, record: Made, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> Array:
+        out = nuisance[0] * SIGNALS["drive"] + initial[0]
+        for one in active:
+            out = out + one.values[0] * SIGNALS.get(one.effect, SIGNALS["drive"] ** 3)
+        return np.asarray(out[:rows, None])
+
+    def places(self, active: Active) -> tuple[str, ...]:
+        sensor = active.effect in ("gauge", "scale")
+        return (f"sensor:{active.site}",) if sensor else (f"place_{active.effect}",)
+
+    def side(self, active: Active) -> str | None:
+        return None
+
+
+def made(sizes: Mapping[str, float]) -> Made:
+    noise = np.random.default_rng(3).normal(0.0, 0.02, ROWS)
+    y = 1.04 * SIGNALS["drive"] + sum(size * SIGNALS[name] for name, size in sizes.items()) + noise
+    return Made("made", y[:, None])
+
+
+def test_a_signal_that_resembles_four_effects_makes_room_for_them() -> None:
+    problem = Problem(Sum(), (made({"a": 1.0, "b": 0.6, "c": 1.2, "d": 0.8}),))
+    contest = compete(problem, Effort(), True, lambda share, what: None)
+    assert contest.singles[0].candidate.laws == (("decoy", ""),)  # or this test would show nothing
+    grow(contest, Thresholds())
+    refit, *others = (score(contest.problem, one) for one in (contest.refit, *contest.finalists))
+    chosen = select(refit, others, Thresholds())
+    assert {name for name, _ in chosen.fit.candidate.laws} == set(TRUE)
+    values = dict(zip((name for name, _ in chosen.fit.candidate.laws),
+                      problem.values(chosen.fit.candidate, chosen.fit.x), strict=True))  # fmt: skip
+    assert np.allclose([values[name] for name in TRUE], [1.0, 0.6, 1.2, 0.8], atol=0.01)
+
+
+def test_a_secant_reproduces_the_step_and_nothing_else() -> None:
+    columns = RNG.normal(size=(50, 2, 3))
+    moved, change = np.array([0.2, -0.1, 0.4]), RNG.normal(size=(50, 2))
+    after = secant(columns, moved, change)
+    assert np.allclose(after @ moved, change)
+    across = np.array([0.1, 0.2, 0.0])  # orthogonal to the step
+    assert abs(across @ moved) < 1e-15 and np.allclose(after @ across, columns @ across)
+
+
+def test_threads_change_no_digit() -> None:
+    record = made({"a": 1.0})
+    candidate = Candidate((("a", ""),))
+    found = []
+    for threads in (1, 2):
+        problem = Problem(Sum(), (record,), threads=threads)
+        one = refreshed(problem, fit(problem, candidate, problem.start(candidate, None, (0.3,))))
+        assert one.jacobian is not None
+        found.append((one.x, one.jacobian))
+    assert np.array_equal(found[0][0], found[1][0]) and np.array_equal(found[0][1], found[1][1])
+
+
+def test_sensors_fail_one_at_a_time_and_sites_do_not_overlap() -> None:
+    model = Sum()
+    assert compatible(model, ("a", ""), ("gauge", "left"))
+    assert not compatible(model, ("gauge", "left"), ("scale", "right"))
+    assert not compatible(model, ("gauge", "left"), ("gauge", "right"))
+    assert not compatible(model, ("a", ""), ("a", ""))
