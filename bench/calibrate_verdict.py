@@ -49,8 +49,9 @@ def evidence_of(entry: dict[str, Any], found: dict[str, Any]) -> EffectEvidence:
     gap, closes = found["gap"], float(found["evidence"].get(f"closes:{entry['effects'][0]}", 0.0))
     left = max(gap["refit"] ** 2 - gap["noise_floor"] ** 2, 1e-12)
     # Any three gaps with the share that was closed will do.
-    return EffectEvidence((entry["effects"][0], ""), (), 1.0, (1.0 - closes) ** 2, 0.0,
-                          entry["share"] * gap["nominal"] ** 2 / left)  # fmt: skip
+    share = entry["share"] * gap["nominal"] ** 2 / left
+    bounds = float(found["evidence"].get(f"at_bounds:{entry['effects'][0]}", 0.0))
+    return EffectEvidence((entry["effects"][0], ""), (), 1.0, (1.0 - closes) ** 2, 0.0, share, bounds)
 
 
 def report(found: list[tuple[dict[str, Any], dict[str, Any], bool]]) -> None:
@@ -74,7 +75,7 @@ def main() -> None:
     loss = []
     for closes, steepness, least in product((0.3, 0.4, 0.5, 0.6, 0.7), (2.0, 4.0, 6.0), (0.005, 0.015, 0.03, 0.06)):
         c = replace(Calibration(), closes=closes, steepness=steepness, least=least)
-        p = [credit(evidence_of(e, d), CALM, int(d["evidence"].get("walls", 0)), c) for e, d, _ in found]
+        p = [credit(evidence_of(e, d), CALM, c) for e, d, _ in found]
         told = np.clip([one if right else 1.0 - one for one, (_, _, right) in zip(p, found, strict=True)], 1e-3, 1.0)
         loss.append((-float(np.mean(np.log(told))), f"closes {closes}, steepness {steepness}, least {least}"))
     print("names that stand:", *(f"  log loss {value:.3f}: {what}" for value, what in sorted(loss)[:6]), sep="\n")

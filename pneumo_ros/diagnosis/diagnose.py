@@ -12,7 +12,7 @@ import numpy as np
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
-from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
+from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
 from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
@@ -86,9 +86,8 @@ def diagnose(
     grow(contest, options.limits, options.pairs)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(contest, holdout, options, tell)
-    held, walls = _on_held_out(outcome), at_bounds(contest.problem, outcome.chosen.fit)
-    evidence = _weighed(outcome)
-    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence, walls)
+    held, evidence = _on_held_out(outcome), _weighed(outcome)
+    opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence)
     if opinion.verdict == "none":  # what nothing speaks for is not told, and not saved
         outcome = _without_effects(outcome)
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
@@ -98,11 +97,16 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     problem = contest.problem
     refit = score(problem, contest.refit)
     finalists = tuple(score(problem, f) for f in contest.finalists)
-    chosen = select(refit, finalists, options.limits)
     everything = np.ones(len(problem.measured), dtype=bool)
     base = _final(problem, contest.refit, everything)
-    best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
-    runs = held_runs(problem, base, best, holdout)
+    while True:
+        chosen = select(refit, finalists, options.limits)
+        best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
+        runs = held_runs(problem, base, best, holdout)
+        if best is base or np.all(np.isfinite(runs["best"].predicted)):
+            break
+        # What runs away from another start is no model of the rig, however well it fits one log.
+        finalists = tuple(one for one in finalists if one is not chosen)
     tell(0.93, "locating")
     floor = total_floor(holdout)
     shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
@@ -247,12 +251,12 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
     """Numbers the verdict rests on."""
     chosen = outcome.chosen
     out = {"level_refit": outcome.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
-    out |= {"walls": float(at_bounds(outcome.problem, chosen.fit))}
     for name, one in (("refit", outcome.before), ("chosen", outcome.after)):
         if one is not None:
             out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
-    out |= {f"closes:{one.family}": one.closes for one in outcome.closable.effects}
+    out |= {f"closes:{effect.family}": effect.closes for effect in outcome.closable.effects}
+    out |= {f"at_bounds:{effect.family}": effect.at_bounds for effect in outcome.closable.effects}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import Effect, Inputs, channels_of, ends_of
-from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of
+from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of, tyre_of
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
 from pneumo_ros.effects.rig_model import Drive, RigModel
 from pneumo_ros.units import GAS_CONSTANT
@@ -205,17 +205,17 @@ def _row(
     plant = model.plant(nuisance, active)
     body, gas = plant.body, (plant.front, plant.rear)[end]
     arm = (body.front_arm, -body.rear_arm)[end]
-    height, rate = state[0] + arm * state[1] - state[2 + end], state[4] + arm * state[5] - state[6 + end]
-    pressure = state[8 + end]
+    top, axle, pressure = state[0] + arm * state[1], state[2 + end], state[8 + end]
+    top_rate, axle_rate = state[4] + arm * state[5], state[6 + end]
     scale = (body.area_scale_front, body.area_scale_rear)[end]
     damping = (body.damping_front, body.damping_rear)[end]
-    strut = strut_of(height, rate, pressure - gas.ambient_pressure, scale, damping, body, model.surface)
-    air = air_of(pressure, height, rate, inputs.commands[i, end], inputs.commands[i, 2 + end], gas.supply_pressure,
-                 gas.supply_power, gas)  # fmt: skip
-    compression = inputs.road[i, end] - state[2 + end]
-    road_rate = (inputs.road[i + 1, end] - inputs.road[i, end]) / period
+    gauge = pressure - gas.ambient_pressure
+    strut = strut_of(top, axle, top_rate, axle_rate, gauge, scale, damping, body, model.surface)
+    inlet, outlet = inputs.commands[i, end], inputs.commands[i, 2 + end]
+    air = air_of(pressure, strut.height, strut.rate, inlet, outlet, gas.supply_pressure, gas.supply_power, gas)
+    slope = (inputs.road[i + 1, end] - inputs.road[i, end]) / period
     stiffness = (body.tyre_stiffness_front, body.tyre_stiffness_rear)[end]
-    return _Row(strut, air, Tyre(compression, road_rate - state[6 + end], stiffness * compression))
+    return _Row(strut, air, tyre_of(top, axle, top_rate, axle_rate, inputs.road[i, end], slope, stiffness))
 
 
 def _along(model: RigModel, parts: Sequence[Active], run: _Run, shared: bool) -> Array:

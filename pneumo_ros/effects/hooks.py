@@ -22,7 +22,7 @@ class Strut(NamedTuple):
     """One air spring as a mechanical link.
 
     height m, rate m/s (extension positive), gauge Pa, area m2 (effective, tolerance factor included),
-    force N (nominal, positive upwards on the body).
+    force N (nominal, positive upwards on the body), middle m and its rate m/s (half-way between body and axle, up).
     """
 
     height: float
@@ -30,6 +30,8 @@ class Strut(NamedTuple):
     gauge: float
     area: float
     force: float
+    middle: float
+    middle_rate: float
 
 
 class Air(NamedTuple):
@@ -51,21 +53,43 @@ class Air(NamedTuple):
 
 
 class Tyre(NamedTuple):
-    """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle)."""
+    """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle),
+    middle m and its rate m/s as of the strut."""
 
     compression: float
     rate: float
     force: float
+    middle: float
+    middle_rate: float
 
 
 @njit(cache=True, error_model="numpy")
 def strut_of(
-    height: float, rate: float, gauge: float, scale: float, damping: float, body: Body, surface: AreaSurface
+    top: float,
+    axle: float,
+    top_rate: float,
+    axle_rate: float,
+    gauge: float,
+    scale: float,
+    damping: float,
+    body: Body,
+    surface: AreaSurface,
 ) -> Strut:
-    """The nominal spring with bushing and bump stop."""
+    """The nominal spring with bushing and bump stop, between a point of the body and an axle."""
+    height, rate = top - axle, top_rate - axle_rate
     area = scale * effective_area(height, gauge, surface)
     stop = body.stop_stiffness * max(0.0, body.stop_height - height)
-    return Strut(height, rate, gauge, area, gauge * area - damping * rate + stop)
+    force = gauge * area - damping * rate + stop
+    return Strut(height, rate, gauge, area, force, 0.5 * (top + axle), 0.5 * (top_rate + axle_rate))
+
+
+@njit(cache=True, error_model="numpy")
+def tyre_of(
+    top: float, axle: float, top_rate: float, axle_rate: float, road: float, slope: float, stiffness: float
+) -> Tyre:
+    """The nominal tyre below a strut."""
+    force = stiffness * (road - axle)
+    return Tyre(road - axle, slope - axle_rate, force, 0.5 * (top + axle), 0.5 * (top_rate + axle_rate))
 
 
 @njit(cache=True, error_model="numpy")

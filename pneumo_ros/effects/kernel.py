@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, air_rate, strut_of
+from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, air_rate, strut_of, tyre_of
 from pneumo_ros.effects.terms import added, advanced, at_rest, parameters, restored, sagged, started, stored, switches
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
 from pneumo_ros.plant.half_car import Body, State, accelerations, moved
@@ -90,13 +90,15 @@ def ends(
     rate_f, rate_r = sprung_points(v, w, body.front_arm, body.rear_arm)
     hf, hr, hfv, hrv = top_f - zuf, top_r - zur, rate_f - vuf, rate_r - vur
     return Signals(
-        strut_of(hf, hfv, pf - front.ambient_pressure, body.area_scale_front, body.damping_front, body, surface),
-        strut_of(hr, hrv, pr - rear.ambient_pressure, body.area_scale_rear, body.damping_rear, body, surface),
+        strut_of(top_f, zuf, rate_f, vuf, pf - front.ambient_pressure, body.area_scale_front, body.damping_front, body,
+                 surface),
+        strut_of(top_r, zur, rate_r, vur, pr - rear.ambient_pressure, body.area_scale_rear, body.damping_rear, body,
+                 surface),
         air_of(pf, hf, hfv, u[0], u[2], feed.pressure_f, feed.power_f, front),
         air_of(pr, hr, hrv, u[1], u[3], feed.pressure_r, feed.power_r, rear),
-        Tyre(height_f - zuf, slope_f - vuf, body.tyre_stiffness_front * (height_f - zuf)),
-        Tyre(height_r - zur, slope_r - vur, body.tyre_stiffness_rear * (height_r - zur)),
-    )
+        tyre_of(top_f, zuf, rate_f, vuf, height_f, slope_f, body.tyre_stiffness_front),
+        tyre_of(top_r, zur, rate_r, vur, height_r, slope_r, body.tyre_stiffness_rear),
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
-from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.result import Estimate
 from pneumo_ros.effects.parameters import EffectParameter
@@ -105,11 +107,20 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
     }
 
 
-def at_bounds(problem: Problem, fit: Fit) -> int:
-    """How many parameters of its effects ended at an end of their allowed range."""
-    free, parameters = _free(problem, fit), problem.effect_parameters(fit.candidate)
-    values = problem.values(fit.candidate, fit.x)
-    return sum(not free[problem.fixed + k] and not _natural(p, values[k]) for k, p in enumerate(parameters))
+def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -> float:
+    """How many parameters of its effects, or of some parts, ended at an end of their allowed range.
+
+    A size counts whole: nothing of the kind is so large. What a law only shapes counts half: another law may bend it.
+    """
+    free, values, found = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x), 0.0
+    first = 0
+    for part in fit.candidate.parts:
+        own = problem.effect_parameters(Candidate((part,)))
+        stuck = [p for k, p in enumerate(own, first) if not free[k] and not _natural(p, values[k])]
+        if parts is None or part in parts:
+            found += sum(1.0 if p.size else 0.5 for p in stuck)
+        first += len(own)
+    return found
 
 
 def _natural(parameter: EffectParameter, value: float) -> bool:

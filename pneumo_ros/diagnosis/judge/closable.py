@@ -16,6 +16,7 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.growth import of_law, reduced, with_parts
@@ -37,6 +38,7 @@ class EffectEvidence:
     own : gap left by the structure
     ceiling : gap left when whatever may act at its places is added
     share : what it holds of what the refit leaves
+    at_bounds : how many of its parameters stand at a bound that is no natural end of its law
     """
 
     law: Part
@@ -45,6 +47,7 @@ class EffectEvidence:
     own: float
     ceiling: float
     share: float = 1.0
+    at_bounds: float = 0.0
 
     @property
     def family(self) -> str:
@@ -108,7 +111,8 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         where = problem.model.places(Active(*law, ()))
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         without = above(problem, bare, holdout, floor)
-        evidence.append(EffectEvidence(law, where, without, own, added(where).left))
+        walls = at_bounds(problem, best, of_law(best.candidate, law))
+        evidence.append(EffectEvidence(law, where, without, own, added(where).left, at_bounds=walls))
     if places:  # together, what is left may need them all; alone, one of them may do
         added(tuple(places[:TOGETHER]))
         added((places[0],))

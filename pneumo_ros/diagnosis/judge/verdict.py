@@ -37,7 +37,7 @@ class Calibration:
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
-    walls : parameters at their bounds at which "unknown" is as likely as the name
+    walls : parameters of an effect at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
@@ -47,7 +47,7 @@ class Calibration:
     closes: float = 0.5
     steepness: float = 4.0
     real: float = 2.5
-    walls: float = 1.3
+    walls: float = 0.9
     least: float = 0.002
     slight: float = 0.12
     held_real: float = 3.0
@@ -119,19 +119,15 @@ def judge(
     calibration: Calibration,
     held: HeldOutGaps,
     evidence: Sequence[EffectEvidence] = (),
-    at_bounds: int = 0,
 ) -> Opinion:
-    """Probabilities of the refit, of every finalist, of each effect of the chosen one, and of "unknown".
-
-    ``at_bounds`` counts the chosen structure's parameters at a bound that is no natural end of its law.
-    """
+    """Probabilities of the refit, of every finalist, of each effect of the chosen one, and of "unknown"."""
     named = structures(refit, finalists, chosen, calibration)
     if not chosen.size:
         unknown = unexplained(refit.level, held, calibration)
         scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
     worse = held.chosen >= held.refit or (held.form > 0.0 and held.refit <= 1.0)
-    trust = {one.law: 0.0 if worse else credit(one, held, at_bounds, calibration) for one in evidence}
+    trust = _beside_unnamed({one.law: 0.0 if worse else credit(one, held, calibration) for one in evidence}, evidence)
     trusted = max(trust.values(), default=0.0)
     unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)
     scaled = {candidate: p * trusted for candidate, p in named.items()}
@@ -142,11 +138,21 @@ def judge(
     return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 
 
-def credit(one: EffectEvidence, held: HeldOutGaps, at_bounds: int, calibration: Calibration) -> float:
+def _beside_unnamed(trust: Mapping[Part, float], evidence: Sequence[EffectEvidence]) -> dict[Part, float]:
+    """No name stands where something larger acts at the same place that is not what it was called: the smaller one may
+    be the rest of it."""
+    out = dict(trust)
+    for one in evidence:
+        larger = [e for e in evidence if e.share > one.share and e.places[:1] == one.places[:1]]
+        out[one.law] = min([trust[one.law], *(trust[e.law] for e in larger)])
+    return out
+
+
+def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> float:
     """Probability that an effect of the structure is what acts at its place, 0..1."""
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
-    against = [(1.0 - one.closes) / (1.0 - c.closes), at_bounds / c.walls, c.least / max(one.share, 1e-9),
+    against = [(1.0 - one.closes) / (1.0 - c.closes), one.at_bounds / c.walls, c.least / max(one.share, 1e-9),
                c.slight / max(closed, 1e-9)]  # fmt: skip
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))

@@ -115,11 +115,25 @@ def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
 def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
     """A structure with further parts, which start at nothing."""
     candidate = Candidate((*one.candidate.parts, *parts))
-    count = len(problem.effect_parameters(Candidate(tuple(parts))))
-    values = [*problem.values(one.candidate, one.x), *np.zeros(count)]
+    values = [*problem.values(one.candidate, one.x), *_beginnings(problem, one, parts)]
     start = problem.start(candidate, one.x[: problem.fixed], values)
     found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
     return found if found.cost < one.cost else one
+
+
+def _beginnings(problem: Problem, one: Fit, parts: Sequence[Part]) -> list[float]:
+    """Values of parts that do nothing yet: sizes zero, and whatever a law of the same family has found by that name."""
+    own = iter(problem.values(one.candidate, one.x).tolist())
+    found = {
+        (family_of(part[0]), part[1], p.name): next(own)
+        for part in one.candidate.parts
+        for p in problem.effect_parameters(Candidate((part,)))
+    }
+    return [
+        0.0 if p.size else found.get((family_of(part[0]), part[1], p.name), p.typical)
+        for part in parts
+        for p in problem.effect_parameters(Candidate((part,)))
+    ]
 
 
 def reduced(

@@ -194,13 +194,13 @@ def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
     ("effect", "values", "walls"),
     [
         ("bump_stop", (2e4, 0.004, 0.0, 0.0), 0),  # a stop without hardening or loss
-        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 2),
+        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 1.0),
         ("bellows_mode", (0.2, 12.0, 0.08, 1.0), 0),  # all of the damping is the wall's own
-        ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 2),
+        ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 1.5),  # its size, and its frequency
     ],
 )
 def test_natural_ends_of_a_law_are_no_walls(
-    model: RigModel, effect: str, values: tuple[float, ...], walls: int
+    model: RigModel, effect: str, values: tuple[float, ...], walls: float
 ) -> None:
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(((effect, "front"),))
     x = problem.start(candidate, None, values)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,21 +25,24 @@ def scored(level: float, cost: float, *effects: str, unknowns: int = 30, site: s
     return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0)
 
 
-def evidence(chosen: Scored, without: float, own: float, ceiling: float) -> list[EffectEvidence]:
+def evidence(
+    chosen: Scored, without: float, own: float, ceiling: float, at_bounds: float = 0.0
+) -> list[EffectEvidence]:
     """For each effect: rms gap without it, with it, and with anything at its place."""
     squares = (without**2, own**2, ceiling**2)
-    return [EffectEvidence(law, ("front_force",), *squares) for law in chosen.fit.candidate.laws]
+    laws = chosen.fit.candidate.laws
+    return [EffectEvidence(law, ("front_force",), *squares, at_bounds=at_bounds) for law in laws]
 
 
 def opinion(
     refit: Scored,
     *others: Scored,
     held: HeldOutGaps = CALM,
-    at_bounds: int = 0,
+    at_bounds: float = 0.0,
     gaps: tuple[float, float, float] = (1.0, 0.1, 0.1),
 ) -> Opinion:
     chosen = select(refit, others, LIMITS)
-    return judge(refit, others, chosen, Calibration(), held, evidence(chosen, *gaps), at_bounds)
+    return judge(refit, others, chosen, Calibration(), held, evidence(chosen, *gaps, at_bounds))
 
 
 def test_what_chance_wins_is_none() -> None:
@@ -68,10 +73,10 @@ def test_a_family_that_closes_what_can_be_closed_is_named_however_much_is_left()
     [
         ((1.0, 0.7, 0.1), HeldOutGaps(20.0, 14.0), 0),  # whatever acts there closes far more than its shape
         ((1.0, 1.1, 0.9), HeldOutGaps(20.0, 21.0), 0),  # worse than the refit on the held-out log
-        ((1.0, 0.1, 0.1), HeldOutGaps(20.0, 1.1), 3),  # a law bent to its ends
+        ((1.0, 0.1, 0.1), HeldOutGaps(20.0, 1.1), 2.0),  # a law bent to its ends
     ],
 )
-def test_a_wrong_name_is_unknown(gaps: tuple[float, float, float], held: HeldOutGaps, at_bounds: int) -> None:
+def test_a_wrong_name_is_unknown(gaps: tuple[float, float, float], held: HeldOutGaps, at_bounds: float) -> None:
     structures = scored(400.0, 3000.0), scored(0.6, -500.0, "bellows_mode", unknowns=33)
     assert opinion(*structures, held=held, at_bounds=at_bounds, gaps=gaps).verdict == "unknown"
     calm = opinion(*structures, held=HeldOutGaps(20.0, 1.1))
@@ -84,6 +89,20 @@ def test_named_and_unnamed_stand_beside_each_other() -> None:
     trusted, wrong = evidence(pair, 1.0, 0.3, 0.28)[0], evidence(pair, 0.5, 0.3, 0.05)[1]
     found = judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 5.0), [trusted, wrong])
     assert found.verdict == "leak" and found.effects["leak", "front"] > 0.9 > 0.5 > found.effects["bump_stop", "front"]
+
+
+def test_no_small_name_stands_beside_something_larger_without_one() -> None:
+    """At the same place; elsewhere it does."""
+    refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "bump_stop", unknowns=36)
+    good, bent = evidence(pair, 1.0, 0.1, 0.1)[0], evidence(pair, 1.0, 0.1, 0.1, at_bounds=2.0)[1]
+    for share, place, verdict in (
+        (0.9, "front_force", "unknown"),
+        (0.9, "rear_air", "leak"),
+        (0.1, "front_force", "leak"),
+    ):
+        large = replace(bent, share=share, places=(place,))
+        effects = [replace(good, share=0.4), large]
+        assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects).verdict == verdict
 
 
 def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a moving part of the bellows may do beside the library's law: swing against the ground, and weigh.
+
+A part of mass m that hangs between both plates by springs: q'' = w^2 (h - q) + 2 zeta w (h' - q'), with h half-way
+between body and axle; each plate gets half of -m q'' and of what it weighs beyond the nominal masses. The law of
+:mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut, where its inertia pushes the plates
+apart; the real ones are anything between the two. No cone: frequency and damping are fitted as well.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.shapes.atoms import SPREAD
+
+State = tuple[float, float]
+Values = tuple[float, float, float, float]
+
+
+@njit(cache=True, error_model="numpy")
+def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
+    """Where the part is and how fast: with its plates."""
+    return (strut.middle, strut.middle_rate)
+
+
+@njit(cache=True, error_model="numpy")
+def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
+    """Exact damped oscillation about plates that move at held speed; half a step behind them, as every term."""
+    w, zeta = 2.0 * math.pi * p[1], p[2]
+    decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
+    e0, v0 = z[0] - (strut.middle - 0.5 * dt * strut.middle_rate), z[1] - strut.middle_rate
+    c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
+    e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
+    v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
+    return (e1 + strut.middle + 0.5 * dt * strut.middle_rate, v1 + strut.middle_rate)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _on_each(middle: float, rate: float, z: State, p: Values) -> float:
+    """N upwards on each plate."""
+    w = 2.0 * math.pi * p[1]
+    return 0.5 * (p[0] * (w * w * (z[0] - middle) + 2.0 * p[2] * w * (z[1] - rate)) - p[3])
+
+
+@njit(cache=True, error_model="numpy")
+def force(strut: Strut, z: State, p: Values) -> float:
+    """On the body, and as a spring's its opposite on the axle."""
+    return _on_each(strut.middle, strut.middle_rate, z, p)
+
+
+@njit(cache=True, error_model="numpy")
+def tyre(tyre: Tyre, z: State, p: Values) -> float:
+    """On the axle: its own share, and what :func:`force` has taken from it."""
+    return 2.0 * _on_each(tyre.middle, tyre.middle_rate, z, p)
+
+
+EFFECTS = (
+    Effect(
+        id="bellows_mode.shape",
+        summary="a moving part of the bellows of any law: it may swing against the ground, and weigh",
+        sites=ENDS,
+        places=("{end}_force", "{end}_tyre"),
+        parameters=(
+            EffectParameter("hanging_mass", "kg", 0.0, 2.0, 0.15, size=True, spread=SPREAD),
+            EffectParameter("mode_frequency", "Hz", 3.0, 40.0, 15.0),
+            EffectParameter("mode_damping_ratio", "1", 0.01, 0.25, 0.08),
+            EffectParameter("weight", "N", -20.0, 20.0, 2.0, size=True, spread=SPREAD),
+        ),
+        term=PlantTerm(states=2, start=start, advance=advance, force=force, tyre=tyre),
+    ),
+)
