@@ -131,7 +131,7 @@ def trial(mode: str, target: str, kind: str, folder: Path) -> Outcome:
 def session(target: str, kind: str, folder: Path, options: list[str], rig: str) -> Outcome:
     """Start a session, send the signal when it is under way, wait for the end and look at what is left."""
     log = folder / "session.mcap"
-    view = ["--view"] if target == "dashboard" else []
+    view = ["--view"] if target in ("dashboard", "supervisor") else []  # what the supervisor leaves behind is all
     said = (folder / "said.txt").open("w+")
     process = subprocess.Popen(
         [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--isolate", "--no-picture", "--no-report", "--output",

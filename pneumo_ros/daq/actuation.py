@@ -23,7 +23,7 @@ WRAP = 1 << 32
 APPLIED_KEPT = 4096  # openings not fetched yet; more than seconds of them
 SENT_KEPT = 512  # commands whose sending time is remembered for the round trip
 KEEP_ALIVE = 20_000_000  # ns between commands while SAFE
-QUICK = 1_000_000  # ns between commands while a change must get through (every look at the timeouts): on a bad line most are lost
+QUICK = 1_000_000  # ns between commands while a change must get through: every look at the timeouts, as some are lost
 QUICK_FOR = 100_000_000  # ns after a trip
 
 

@@ -134,16 +134,18 @@ def test_interrupt_finishes_the_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_nodes_end_when_their_supervisor_is_killed(tmp_path: Path) -> None:
+def test_nodes_and_dashboard_end_when_their_supervisor_is_killed(tmp_path: Path) -> None:
+    pytest.importorskip("bokeh")
     path = tmp_path / "session.mcap"
-    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture")
+    process = sessions.start("--duration", "0", "--output", str(path), "--no-picture", "--view")
     sessions.wait_for(process, path.with_name("session.mcap.part"), 200_000)
-    nodes = sessions.children(process.pid).values()
+    started = sessions.children(process.pid)
+    assert len(started) == 6 and "view" in started
     sessions.kill(process.pid)
     process.communicate(timeout=60)
     end = time.monotonic() + 30.0
-    while any(Path(f"/proc/{pid}").exists() for pid in nodes):
-        assert time.monotonic() < end, "nodes live on without their supervisor"
+    while left := [name for name, pid in started.items() if Path(f"/proc/{pid}").exists()]:
+        assert time.monotonic() < end, f"{left} live on without their supervisor"
         time.sleep(0.1)
     assert read_log(path).topics["/rig/displacement"].count > 100
 
