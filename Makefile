@@ -31,8 +31,11 @@ lint: $(READY)
 types: $(READY)
 	$(BIN)/mypy
 
+# Two processes share the files of tests; those of the clock have the computer to themselves afterwards.
+WORKERS ?= 2
 unit: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not realtime" --numprocesses $(WORKERS) --dist loadscope --no-loadscope-reorder
+	$(BIN)/python -m pytest -m realtime
 
 # A second environment with what Ubuntu 24.04 packages, and PyPI's colcon: as near to a sourced Jazzy as wheels come.
 FLOORS := .venv-floors
@@ -75,7 +78,6 @@ SPEED := kernel composed control_step reading replay lockstep
 bench: $(READY)  ## Every speed, side by side with its limit
 	for name in $(SPEED); do echo "== $$name"; $(BIN)/python bench/$$name.py || exit 1; done
 
-WORKERS ?= 2
 BLIND ?= build/blind
 
 blind: $(READY)  ## The full blind check, 280 sealed cases (two hours on 2 cores); goes on where it was interrupted
