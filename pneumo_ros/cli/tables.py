@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 from pneumo_ros.session.summary import change, figures, pace, ride_rows
 from pneumo_ros.units import SQUARE_INCH
@@ -70,6 +71,16 @@ def plain_table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Ta
         table.add_column(column, no_wrap=number == 0)
     for row in rows:
         table.add_row(*row)
+    return table
+
+
+def fact_table(facts: Sequence[tuple[str, str]]) -> Table:
+    """What is told, and its text, which may break over lines."""
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 2), pad_edge=True)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name, text in facts:
+        table.add_row(name, Text(text))
     return table
 
 
