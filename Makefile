@@ -15,12 +15,14 @@ help:  ## Show this list
 
 $(READY): requirements.lock setup.py package.xml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input -r requirements.lock
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --no-deps --no-build-isolation --editable .
 	@touch $@
 
-demo: $(READY)  ## A 20 s closed-loop session on a class D road: log, summary, picture
-	$(BIN)/pneumo run --isolate --road D --duration 20
+SEED ?= 1
+
+demo: $(READY)  ## A rig with a hidden effect, two sessions, the diagnosis, the answer beside it (2 min; SEED=2 draws another)
+	$(BIN)/pneumo demo --seed $(SEED)
 
 test: lint types unit  ## Lint, types and every test
 

@@ -68,6 +68,14 @@ class Written:
     reason: str = ""
 
 
+class _Written(yaml.SafeDumper):
+    """YAML that says everything where it belongs: our own reader refuses aliases."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """A value that occurs twice is written twice."""
+        return True
+
+
 class LogWriter:
     """A session log being written.
 
@@ -186,9 +194,9 @@ class LogWriter:
             reason or self._stopped,
         )
         description = self._bag_description(result)
-        text = yaml.safe_dump(description, sort_keys=False)
+        text = yaml.dump(description, Dumper=_Written, sort_keys=False)
         end = {"complete": str(result.complete).lower(), "reason": result.reason}
-        own = yaml.safe_dump(description["rosbag2_bagfile_information"], sort_keys=False)
+        own = yaml.dump(description["rosbag2_bagfile_information"], Dumper=_Written, sort_keys=False)
         self._attempt(lambda: self._writer.add_metadata("session", end))
         self._attempt(lambda: self._writer.add_metadata("rosbag2", {"serialized_metadata": own}))
         if self._attempt(self._writer.finish):  # a file without its end keeps the name of an unfinished one
