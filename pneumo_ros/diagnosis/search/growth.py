@@ -27,7 +27,7 @@ SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
 COUNTS = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end
 EXCHANGED = (8, 1, 1)  # the same for each effect that is exchanged
 TURNS = 9  # additions and exchanges at most
-STRANGE = 4.0  # mean square on the kept blocks, sigmas: above it something is missing that no addition may help
+STRANGE, LEFT = 4.0, 0.01  # mean square on the kept blocks, in sigmas and of the refit's: above both something is wrong
 STEP = 0.3  # of the gain that would be evident: what a turn must bring, as a step towards one that is
 EXCHANGES, MISSED_LEAST = 3, 3  # times that no addition helps; effects that are then tried for exchange
 STEPS = 5
@@ -60,14 +60,15 @@ def _climb(contest: Contest, start: Scored, evident: float) -> None:
     def price(one: Fit) -> float:
         return score(problem, one).price
 
+    strange = max(STRANGE, LEFT * score(problem, contest.refit).level)
     current, known = start.fit, {start.size: start.price}
     for turn in range(TURNS):
         contest.progress(0.84 + 0.05 * turn / TURNS, f"beside {current.candidate.label}")
         size = len(current.candidate.laws)
         found = _one_more(contest, current) if size < MOST else []
         if not found or min(map(price, found)) > price(current) - worth:
-            strange = exchanges > 0 and score(problem, current).level > STRANGE
-            found, exchanges = _one_exchanged(contest, current, worth) if strange else [], exchanges - 1
+            wrong = exchanges > 0 and score(problem, current).level > strange
+            found, exchanges = _one_exchanged(contest, current, worth) if wrong else [], exchanges - 1
         if not found:
             break
         contest.structures += found

@@ -19,8 +19,8 @@ QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion 
 FEW = 100  # samples from which a typical run length is taken
 RUN_FACTOR = 5.0  # times the run length that quantisation explains elsewhere in the channel
 GLITCH_SIGMA = 15.0
-# What nearly every sample keeps to, as sigmas of a normal law: a chattering valve makes a zigzag of the pressure, of which
-# each tip stands alone, and the median of a median filter's rest says nothing.
+# What nearly every sample keeps to, as sigmas of a normal law: a chattering valve makes a zigzag of the pressure,
+# each of whose tips stands alone, and the median of a median filter's rest says nothing.
 COMMON, COMMON_SIGMA = 0.98, 2.33
 MOSTLY = 0.5  # a channel with fewer real samples than this share is left out
 NOISE_FACTOR = 2.0  # estimated against stated noise, either way
