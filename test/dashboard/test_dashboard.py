@@ -28,7 +28,7 @@ from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
-from pneumo_ros.dashboard.guard import is_loopback
+from pneumo_ros.dashboard.guard import MAX_VIEWERS, is_loopback
 from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
 from pneumo_ros.dashboard.source import Playback
@@ -164,6 +164,28 @@ def test_only_this_computer_and_this_page_with_the_token(log_path: Path) -> None
             assert not greeted(bare, "http://evil.example", kept) and not greeted(bare, origin)
             assert not greeted(bare, "null", kept) and not greeted(bare, origin, "pneumo_token=wrong")
             assert greeted(bare, origin, kept)
+
+
+def test_web_sockets_of_ones_own_making_open_no_more_tabs_than_pages_do(log_path: Path) -> None:
+    async def opened(url: str, cookie: str) -> list[int]:
+        """Status of each attempt, all of them kept open; 101 for those that were let in."""
+
+        async def one() -> tuple[int, object]:
+            headers = {"Origin": url.rstrip("/"), "Cookie": cookie}
+            token = generate_jwt_token(generate_session_id())
+            request = HTTPRequest(url.replace("http", "ws", 1) + "ws", headers=headers)
+            try:
+                socket = await websocket_connect(request, subprotocols=["bokeh", token])
+                return (101 if await socket.read_message() is not None else 0), socket
+            except HTTPClientError as error:
+                return error.code, None
+
+        return [status for status, _ in [await one() for _ in range(MAX_VIEWERS + 3)]]
+
+    with served(str(log_path)) as (url, _):
+        bare, token = url.split("?token=")
+        assert asyncio.run(opened(bare, f"pneumo_token={token}")) == [101] * MAX_VIEWERS + [503] * 3
+        assert fetch(bare, Cookie=f"pneumo_token={token}") == 503
 
 
 @pytest.mark.realtime
