@@ -24,7 +24,8 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
-from pneumo_ros.diagnosis.fit.problem import AVERAGED, REACH
+from pneumo_ros.diagnosis.fit.pace import HALF_CAR
+from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.selection import Thresholds
@@ -78,7 +79,7 @@ class ChamberRecord:
     @property
     def noise(self) -> Array:
         """Standard deviation of the reading, Pa; slow, so that the fit's averaging must not take it for white."""
-        return np.array([WANDER * np.sqrt(AVERAGED)])
+        return np.array([WANDER * np.sqrt(HALF_CAR.averaged)])
 
     def slice(self, first: int, last: int) -> ChamberRecord:
         """Rows ``first`` to ``last`` (excluded)."""
