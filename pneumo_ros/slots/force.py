@@ -115,9 +115,8 @@ def force(c: Array, z: Array, P: Array, S: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _friction(v: float, load: float, z: Array, P: Array, S: Array) -> float:
-    if P[COULOMB] == 0.0 and P[STRIBECK] == 0.0 and P[SOFT] == 0.0 and P[PRESLIDING] == 0.0:
-        if P[ONE_SIDED_OUT] == 0.0 and P[ONE_SIDED_IN] == 0.0 and P[LOADED] == 0.0:
-            return 0.0
+    if not P[: LOADED + 1].any():
+        return 0.0
     turned = math.tanh(v / S[S_TURNOVER])
     out = -(P[COULOMB] + P[LOADED] * abs(load)) * turned
     if P[STRIBECK] != 0.0:

@@ -19,7 +19,7 @@ from pneumo_ros.arrays import Array
 FEWEST_BLOCKS, MOST_BLOCKS = 9, 48  # of a whole record: three turns of three; blocks shorter than that tell no more
 PERIODS = 1.5  # of the slowest motion in a block, where the record is long enough
 FASTEST = 0.99  # share of a channel's power below its bandwidth
-SAMPLES = 8.0  # fit samples in the period of the fastest motion
+SAMPLES = 20.0  # fit samples in the period of the fastest motion
 FEWEST_SAMPLES = 240  # fit samples of a record that averaging leaves
 SHORTEST_SETTLE, SETTLED = 8, 0.25  # rows; periods of the slowest motion
 LONGEST_SETTLE = 0.1  # of the record
@@ -36,6 +36,7 @@ class Pace:
     correlation : fit samples that count as one
     settle : s at the start of a held-out log from which its initial state is refined
     wander : s, length of the blocks that intervals draw from the held-out log
+    period : s, of the slowest motion
     """
 
     block: float = 1.25
@@ -43,6 +44,7 @@ class Pace:
     correlation: float = 10.0
     settle: float = 0.2
     wander: float = 1.0
+    period: float = 0.5
 
 
 HALF_CAR = Pace()
@@ -67,7 +69,7 @@ def pace_of_signals(measured: Array, period: float) -> Pace:
     averaged = int(np.clip(min(1.0 / (SAMPLES * fast * period), rows / FEWEST_SAMPLES), 1, 50))
     correlation = max(1.0, 1.0 / (2.0 * fast * averaged * period))
     settle = float(np.clip(SETTLED / slow, SHORTEST_SETTLE * period, max(LONGEST_SETTLE * whole, period)))
-    return Pace(block, averaged, correlation, settle, min(block, whole / 5.0))
+    return Pace(block, averaged, correlation, settle, min(block, whole / 5.0), 1.0 / slow)
 
 
 def motions(measured: Array, period: float) -> tuple[float, float]:
