@@ -49,8 +49,9 @@ def curve_of(
             column = 0
         else:
             rate = family in OVER_RATE or (family not in _OVER_TRAVEL and float(np.ptp(seen[:, 1])) > 0.0)
-            axes = Axis(*(("rate", f"{slot.travel_unit}/s") if rate else ("travel", slot.travel_unit))), Axis(
-                "force", slot.unit
+            axes = (
+                Axis(*(("rate", f"{slot.travel_unit}/s") if rate else ("travel", slot.travel_unit))),
+                Axis("force", slot.unit),
             )
             column = 1 if rate else 0
         found: Found = lambda parts: (seen[:, column], _along(model, parts, seen, record))  # noqa: E731
@@ -92,7 +93,9 @@ def _signal(model: OwnRig, parts: Sequence[Active], record: OwnRecord, step: boo
     S = model.scaling.signals[place]
     P = model.signal_values(place, parts)
     if step:
-        length = 4.0 * max(float(S[si.S_LAGS + 2]), *(P[[si.LAG, si.SECOND_LAG, si.DELAY]] if P is not None else (0.0,)))
+        length = 4.0 * max(
+            float(S[si.S_LAGS + 2]), *(P[[si.LAG, si.SECOND_LAG, si.DELAY]] if P is not None else (0.0,))
+        )
         period = length / STEP_ROWS
         u = np.ones(STEP_ROWS + 4)
         u[:4] = 0.0

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The free run of a user's model with what acts at its slots: RK4 with fixed sub-steps, compiled where it can be.
+"""The free run of a user's model, compiled where it can be: :mod:`pneumo_ros.own_rig.loop` around a generated bridge.
 
-The user's functions take named tuples; a few generated lines stand between them and the arrays of the loop. Where
-numba cannot compile them the same loop runs as plain Python, a hundred times slower.
+The user's functions take named tuples; a few generated lines stand between them and the arrays of the loop. Bridge and
+loop are one file of the user's cache, named by the hash of all that they are made of, so that numba compiles a rig
+once. Where it cannot compile it, the same loop runs as plain Python, a hundred times slower.
 """
 
 from __future__ import annotations
 
-import linecache
-from collections import namedtuple
+import ast
+import hashlib
+import importlib.util
+import inspect
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,14 +23,17 @@ from numba import njit
 from numba.core.errors import NumbaError
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.effects.cache import kept
+from pneumo_ros.own_rig import loop
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 
 FORCE, FLOW = 0, 1  # how a slot's term is evaluated
-LARGEST = 1e100  # of a state: beyond it a run has diverged
-MEMORIES = max(fo.MEMORIES, fl.MEMORIES)
 VALUES = max(fo.VALUES, fl.VALUES)
 SCALES = max(fo.SCALES, fl.SCALES)
+# A rig.py that imports nothing else is all that its functions depend on: what numba made of it may be kept.
+SELF_CONTAINED = ("__future__", "collections", "dataclasses", "math", "numba", "numpy", "pneumo_ros", "typing")
+READING = ("open", "load", "loadtxt", "genfromtxt", "fromfile", "exec", "eval", "__import__")
 
 
 @dataclass(frozen=True)
@@ -45,8 +53,7 @@ class Kernel:
 
     Attributes
     ----------
-    run : (x0, u, held, period, substeps, p, terms, on, P, S, since) -> channels (N, C), coordinates (N, K, 3), what
-        acts (N, K); NaN after a divergence
+    run : :func:`pneumo_ros.own_rig.loop.run`
     derivative, coordinates : the user's own, of arrays, written into their last argument
     compiled : whether numba compiled it
     why_not : numba's first line where it did not
@@ -64,7 +71,7 @@ def build(
     rhs: Callable[..., Any] | None,
     outputs: Callable[..., Any],
     coordinates: Sequence[Sequence[Callable[..., Any]]],
-    jit: bool = True,
+    source: str,
 ) -> Kernel:
     """The kernel of a model.
 
@@ -72,20 +79,20 @@ def build(
     ----------
     rhs : None for a model without states
     coordinates : of each slot that acts inside the equations
-    jit : try numba
+    source : of rig.py, all that the functions depend on
     """
-    compiler: Callable[[Any], Any] = njit(error_model="numpy") if jit else (lambda f: f)
-    bridge = _bridge(names, rhs, outputs, coordinates, compiler)
-    kernel = Kernel(_loop(bridge, len(names.channels), compiler), bridge[0], bridge[2], jit)
-    if not jit:
-        return kernel
+    own = {"rhs": rhs, "outputs": outputs}
+    own |= {f"c{k}_{j}": one for k, row in enumerate(coordinates) for j, one in enumerate(row)}
+    shape = [len(row) for row in coordinates]
     try:
-        tried(kernel, names, len(coordinates))
+        module = _module(names, own, shape, source, compiled=True)
+        kernel = Kernel(module.run, module.derivative, module.coordinates, True)
+        tried(kernel, names, len(shape))
+        return kernel
     except NumbaError as error:
         reason = next((line.strip() for line in str(error).splitlines() if line.strip()), "no reason given")
-        plain = build(names, _plain(rhs), _plain(outputs), [[_plain(c) for c in row] for row in coordinates], False)
-        return Kernel(plain.run, plain.derivative, plain.coordinates, False, reason)
-    return kernel
+        module = _module(names, own, shape, source, compiled=False)
+        return Kernel(module.run, module.derivative, module.coordinates, False, reason)
 
 
 def tried(kernel: Kernel, names: Names, slots: int) -> tuple[Array, Array, Array]:
@@ -95,31 +102,50 @@ def tried(kernel: Kernel, names: Names, slots: int) -> tuple[Array, Array, Array
     return kernel.run(x, u, held, 1e-3, 1, p, terms, on, np.zeros((slots, VALUES)), np.ones((slots, SCALES)), 0.0)
 
 
-def _plain(function: Any) -> Any:
-    return getattr(function, "py_func", function)
+def _module(names: Names, own: dict[str, Any], shape: Sequence[int], source: str, compiled: bool) -> ModuleType:
+    """The generated module with the user's functions put where it calls them."""
+    text = _text(names, own["rhs"] is not None, shape, compiled and self_contained(source), compiled, source)
+    name = f"own_rig_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    path = kept(f"{name}.py", text.encode())
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)  # numba finds what it kept by this name
+    spec.loader.exec_module(module)
+    for key, function in own.items():
+        plain = getattr(function, "py_func", function)
+        setattr(module, key, njit(error_model="numpy")(plain) if compiled and function is not None else plain)
+    return module
 
 
-def _bridge(
-    names: Names, rhs: Any, outputs: Any, coordinates: Sequence[Sequence[Any]], compiler: Callable[[Any], Any]
-) -> tuple[Any, Any, Any]:
-    """derivative, reading and coordinates of arrays, around the user's functions of named tuples."""
+def self_contained(source: str) -> bool:
+    """Whether a source depends on nothing that could change without its text."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import) and any(a.name.partition(".")[0] not in SELF_CONTAINED for a in node.names):
+            return False
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] not in SELF_CONTAINED:
+            return False
+        if isinstance(node, (ast.Name, ast.Attribute)) and getattr(node, "id", getattr(node, "attr", "")) in READING:
+            return False
+    return True
+
+
+def _text(names: Names, states: bool, shape: Sequence[int], cached: bool, compiled: bool, source: str) -> str:
+    made_of = "".join([source, *(inspect.getsource(one) for one in (fo, fl))])
     kinds = {"State": names.states, "Inputs": names.inputs, "Parameters": names.parameters, "Acting": names.slots}
-    space: dict[str, Any] = {kind: namedtuple(kind, fields) for kind, fields in kinds.items()}
-    space |= {"rhs": rhs and compiler(_plain(rhs)), "outputs": compiler(_plain(outputs))}
-    x, u, p = (_packed(kind, kinds[kind], arg) for kind, arg in (("State", "x"), ("Inputs", "u"), ("Parameters", "p")))
-    f = _packed("Acting", names.slots, "f")
-    lines = ["def derivative(x, u, p, f, out):"]
-    lines += _assigned(f"rhs({x}, {u}, {p}, {f})", len(names.states)) if rhs else [" pass"]
-    lines += ["def reading(x, u, p, f, out):", *_assigned(f"outputs({x}, {u}, {p}, {f})", len(names.channels))]
-    lines += ["def coordinates(x, u, p, out):", f" x = {x}", f" u = {u}", f" p = {p}"]
-    for k, row in enumerate(coordinates):
-        for j, one in enumerate(row):
-            space[f"c{k}_{j}"] = compiler(_plain(one))
-            lines.append(f" out[{k}, {j}] = c{k}_{j}(x, u, p)")
-    source, name = "\n".join(lines) + "\n", f"<bridge of {id(space):x}>"
-    linecache.cache[name] = (len(source), None, source.splitlines(True), name)  # for readable errors
-    exec(compile(source, name, "exec"), space)  # generated above from checked identifiers
-    return tuple(compiler(space[one]) for one in ("derivative", "reading", "coordinates"))
+    x, u, p, f = (_packed(kind, fields, arg) for (kind, fields), arg in zip(kinds.items(), "xupf", strict=True))
+    lines = ["from __future__ import annotations", "from collections import namedtuple", "from numba import njit"]
+    lines += [f"# made of {hashlib.sha256(made_of.encode()).hexdigest()}", f"CHANNELS = {len(names.channels)}"]
+    lines += [f"{kind} = namedtuple({kind!r}, {list(fields)!r})" for kind, fields in kinds.items()]
+    lines += [f'compiled = njit(error_model="numpy", cache={cached})' if compiled else "compiled = lambda f: f"]
+    lines += ["@compiled", "def derivative(x, u, p, f, out):"]
+    lines += _assigned(f"rhs({x}, {u}, {p}, {f})", len(names.states)) if states else [" pass"]
+    lines += ["@compiled", "def reading(x, u, p, f, out):"]
+    lines += _assigned(f"outputs({x}, {u}, {p}, {f})", len(names.channels))
+    lines += ["@compiled", "def coordinates(x, u, p, out):", f" x = {x}", f" u = {u}", f" p = {p}"]
+    lines += [f" out[{k}, {j}] = c{k}_{j}(x, u, p)" for k, count in enumerate(shape) for j in range(count)]
+    body = [line for line in inspect.getsource(loop).splitlines()
+            if not line.startswith(("from __future__", "from pneumo_ros.own_rig.bridge"))]  # fmt: skip
+    return "\n".join([*lines, *body]) + "\n"
 
 
 def _packed(kind: str, fields: Sequence[str], array: str) -> str:
@@ -127,114 +153,6 @@ def _packed(kind: str, fields: Sequence[str], array: str) -> str:
 
 
 def _assigned(call: str, count: int) -> list[str]:
-    return [f" r = {call}", *(f" out[{k}] = r[{k}]" for k in range(count)), " return None"]
-
-
-def _loop(bridge: tuple[Any, Any, Any], channels: int, compiler: Callable[[Any], Any]) -> Any:
-    """The free run, closed over the user's functions."""
-    derivative, reading, coordinates = bridge
-    start_force, advance_force, force = fo.start, fo.advance, fo.force
-    start_flow, advance_flow, flow = fl.start, fl.advance, fl.flow
-    memories = MEMORIES
-
-    def begin(
-        x: Array, u: Array, p: Array, terms: Any, on: Any, P: Array, S: Array, since: float, c: Array, z: Array
-    ) -> None:
-        coordinates(x, u, p, c)
-        for s in range(len(terms)):
-            if on[s]:
-                if terms[s] == 0:
-                    start_force(c[s], z[s], S[s])
-                else:
-                    start_flow(c[s], z[s], since, P[s], S[s])
-
-    def advance(
-        x: Array, u: Array, p: Array, terms: Any, on: Any, P: Array, S: Array, h: float, c: Array, z: Array
-    ) -> None:
-        coordinates(x, u, p, c)
-        for s in range(len(terms)):
-            if on[s]:
-                if terms[s] == 0:
-                    advance_force(c[s], z[s], h, P[s], S[s])
-                else:
-                    advance_flow(c[s], z[s], h, P[s], S[s])
-
-    def act(
-        x: Array, u: Array, p: Array, terms: Any, on: Any, P: Array, S: Array, c: Array, z: Array, f: Array
-    ) -> None:
-        coordinates(x, u, p, c)
-        for s in range(len(terms)):
-            f[s] = 0.0
-            if on[s]:
-                if terms[s] == 0:
-                    f[s] = force(c[s], z[s], P[s], S[s])
-                else:
-                    f[s] = flow(c[s], z[s], P[s], S[s])
-
-    begin, advance, act = compiler(begin), compiler(advance), compiler(act)
-
-    def slope(x: Array, u: Array, p: Array, terms: Any, on: Any, P: Array, S: Array, c: Array, z: Array, f: Array,
-              out: Array) -> None:  # fmt: skip
-        act(x, u, p, terms, on, P, S, c, z, f)
-        derivative(x, u, p, f, out)
-
-    slope = compiler(slope)
-
-    def moved(x: Array, k: Array, h: float, out: Array) -> None:
-        for j in range(len(x)):
-            out[j] = x[j] + h * k[j]
-
-    moved = compiler(moved)
-
-    def step(x: Array, ends: Array, h: float, p: Array, terms: Any, on: Any, P: Array, S: Array, c: Array, z: Array, f: Array,
-             K: Array, trial: Array) -> None:  # fmt: skip
-        slope(x, ends[0], p, terms, on, P, S, c, z, f, K[0])
-        moved(x, K[0], 0.5 * h, trial)
-        slope(trial, ends[1], p, terms, on, P, S, c, z, f, K[1])
-        moved(x, K[1], 0.5 * h, trial)
-        slope(trial, ends[1], p, terms, on, P, S, c, z, f, K[2])
-        moved(x, K[2], h, trial)
-        slope(trial, ends[2], p, terms, on, P, S, c, z, f, K[3])
-        for j in range(len(x)):
-            x[j] += h / 6.0 * (K[0, j] + 2.0 * (K[1, j] + K[2, j]) + K[3, j])
-
-    def between(u: Array, held: Any, i: int, substep: int, substeps: int, ends: Array) -> None:
-        for j in range(len(held)):
-            rise = 0.0 if held[j] else (u[i + 1, j] - u[i, j]) / substeps
-            ends[0, j] = u[i, j] + rise * substep
-            ends[1, j] = ends[0, j] + 0.5 * rise
-            ends[2, j] = ends[0, j] + rise
-
-    def finite(x: Array) -> bool:
-        for j in range(len(x)):
-            if not abs(x[j]) < LARGEST:
-                return False
-        return True
-
-    step, between, finite = compiler(step), compiler(between), compiler(finite)
-
-    def run(
-        x0: Array, u: Array, held: Any, period: float, substeps: int, p: Array, terms: Any, on: Any, P: Array, S: Array,
-        since: float,
-    ) -> tuple[Array, Array, Array]:  # fmt: skip
-        rows, slots = len(u), len(terms)
-        out, where, acted = np.full((rows, channels), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
-        c, z, f = np.zeros((slots, 3)), np.zeros((slots, memories)), np.zeros(slots)
-        x, trial, K, ends = x0.copy(), x0.copy(), np.zeros((4, len(x0))), np.zeros((3, len(held)))
-        h = period / substeps
-        begin(x, u[0], p, terms, on, P, S, since, c, z)
-        for i in range(rows):
-            if not finite(x):
-                break
-            act(x, u[i], p, terms, on, P, S, c, z, f)
-            where[i], acted[i] = c, f
-            reading(x, u[i], p, f, out[i])
-            if i < rows - 1:
-                for k in range(substeps):
-                    between(u, held, i, k, substeps, ends)
-                    if len(x) > 0:
-                        step(x, ends, h, p, terms, on, P, S, c, z, f, K, trial)
-                    advance(x, ends[2], p, terms, on, P, S, h, c, z)
-        return out, where, acted
-
-    return compiler(run)
+    """Exactly as many values as there are names for them."""
+    targets = ", ".join(f"r{k}" for k in range(count))
+    return [f" ({targets},) = {call}", *(f" out[{k}] = r{k}" for k in range(count))]

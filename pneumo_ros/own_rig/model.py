@@ -122,10 +122,10 @@ class OwnRig:
         for k, slot in enumerate(self.physics.inside):
             if on[k] and isinstance(slot, Force):
                 P[k], S[k] = fo.steadied(P[k], S[k], float(self.scaling.mobility[k]), h)
+        p, steps, state = self.given(nuisance), self.scaling.substeps, np.asarray(initial, dtype=float)
         out, where, acted = self.physics.kernel.run(
-            np.asarray(initial, dtype=float), inputs, self.held, record.period, self.scaling.substeps, self.given(nuisance),
-            self.terms, on, P, S, record.since,
-        )  # fmt: skip
+            state, inputs, self.held, record.period, steps, p, self.terms, on, P, S, record.since
+        )
         return self._sensed(out, record.period, acting), where, acted
 
     def given(self, nuisance: Array | None) -> Array:
@@ -255,8 +255,9 @@ def _check_standing(rig: Description, model: OwnRig) -> None:
     for one in rig.effects:
         known = model.library.get(one.effect)
         if known is None or one.site not in known.sites or len(one.values) != len(known.by_site[one.site]):
-            raise InputError("no such effect at this slot", where=rig.path, key="effects",
-                             value=f"{one.effect} at {one.site}", remedy="give the rig.py that it was saved with")  # fmt: skip
+            told = f"{one.effect} at {one.site}"
+            raise InputError("no such effect at this slot", where=rig.path, key="effects", value=told,
+                             remedy="give the rig.py that it was saved with")  # fmt: skip
 
 
 def slot_of(model: OwnRig, place: str) -> Slot:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import inspect
 import sys
@@ -63,7 +64,7 @@ def load_physics(path: Path, rig: Description) -> Physics:
     helpers = {k: v for k, v in vars(module).items() if isinstance(v, FunctionType) and v.__module__ == module.__name__}
     _compile_helpers(module, helpers, {"rhs", "outputs"})
     try:
-        kernel = build(names, rhs, outputs, [slot.coordinates for slot in inside])
+        kernel = build(names, rhs, outputs, [slot.coordinates for slot in inside], path.read_text("utf-8"))
         if not kernel.compiled:
             vars(module).update(helpers)
             tried(kernel, names, len(inside))
@@ -77,10 +78,13 @@ def load_physics(path: Path, rig: Description) -> Physics:
 def _module(path: Path) -> ModuleType:
     if not path.is_file():
         raise InputError("no such file", where=path, key="--rig-model", remedy="check the name")
-    spec = importlib.util.spec_from_file_location(f"own_rig_{abs(hash(path.resolve())):x}", path)
+    # By content: what numba keeps of its functions names the module they came from.
+    name = f"rig_model_{hashlib.sha256(path.read_bytes()).hexdigest()[:20]}"
+    spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise InputError("not a Python file", where=path, key="--rig-model", allowed="rig.py")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
     kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)

@@ -244,12 +244,14 @@ def _timing(name: str, one: Sampled, start: float) -> TopicTiming:
     median = float(np.median(steps))
     missing = int(np.sum(np.maximum(np.round(steps / median) - 1.0, 0.0)))
     jitter = 1.4826 * float(np.median(np.abs(steps - median)))
-    return TopicTiming(name, len(one.time), 1.0 / median, float(one.time[0] - start), float(one.time[-1] - start), jitter,
-                       missing, float(steps.max()), float("nan"))  # fmt: skip
+    first, last = float(one.time[0] - start), float(one.time[-1] - start)
+    return TopicTiming(
+        name, len(one.time), 1.0 / median, first, last, jitter, missing, float(steps.max()), float("nan")
+    )
 
 
 def first_values(record: OwnRecord, column: Array, noise: float) -> tuple[Array, Array]:
-    """Value and rate of a column (N,) at row 0 with their standard deviations, from a parabola through the first rows."""
+    """Value and rate of a column (N,) at row 0 with their standard deviations: a parabola through the first rows."""
     rows = int(np.clip(round(record.pace.settle / record.period), *FIRST))
     rows = min(rows, len(column))
     t = np.arange(rows) * record.period
