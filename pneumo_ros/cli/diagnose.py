@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -20,7 +20,6 @@ from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
     from pneumo_ros.diagnosis.result import Diagnosis, EditTest
-    from pneumo_ros.diagnosis.signals import Signals
 
 app = App(add_completion=False)
 SHARE_SHOWN = 0.05
@@ -64,6 +63,13 @@ def diagnose(
             help="Write the corrected rig with its effects (YAML) here, for --rig of run, emulate, replay and diagnose."
         ),
     ] = None,
+    rig_model: Annotated[
+        Path | None,
+        typer.Option(
+            help="A rig of your own: its physics (rig.py, with rig.yaml beside it, or --rig). Logs may then be tables: "
+            "CSV, Parquet, .mat (docs/your-rig.md)."
+        ),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
     overwrite: Overwrite = False,
     tables: Annotated[
@@ -87,6 +93,14 @@ def diagnose(
     if not fit or output is None:
         missing = "no log to fit" if not fit else "no folder for the diagnosis"
         raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
+    if rig_model is not None:
+        from pneumo_ros.cli.diagnose_own import diagnose_own
+
+        if edit is not None or effect:
+            key, given = ("--effect", effect[0]) if effect else ("--edit", edit)
+            raise InputError("is the half car's own", where=given, key=key, remedy="leave it away with --rig-model")
+        diagnose_own(console, rig_model, fit, holdout, output, rig, without or (), save_rig, pairs, overwrite)
+        return
     _check_files(fit, holdout, edit, rig, effect)
     refuse_old_diagnosis(output, save_rig, overwrite, [rig] if rig is not None else [])
     from pneumo_ros.diagnosis.diagnose import Options
@@ -106,7 +120,7 @@ def diagnose(
         tell_assumed(console, own, rig)
     task = prepared(fit, holdout, own, edit, effect or (), without or ())
     options = Options(pairs=pairs, experiment=design_experiment, threads=os.cpu_count() or 1)
-    with _bar(console) as progress:
+    with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
     files = write_outputs(output, found, task.model, task.fit, task.holdout)
@@ -114,7 +128,8 @@ def diagnose(
         files += found.experiment.write(output)
     if save_rig is not None:
         files.append(save_corrected_rig(found, task.model, save_rig))
-    _show(console, found, {name: effect.summary for name, effect in task.model.library.items()}, task.fit)
+    phrases = {name: effect.summary for name, effect in task.model.library.items()}
+    show(console, found, found.to_json(), phrases, [log.name for log in task.fit])
     if found.experiment is not None:
         console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
         console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
@@ -135,11 +150,12 @@ def _check_files(
             raise InputError("no such file", where=file, key=key, remedy="check the name")
 
 
-def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: Sequence[Signals]) -> None:
+def show(
+    console: Console, found: Diagnosis, summary: Mapping[str, Any], phrases: Mapping[str, str], fit: Sequence[str]
+) -> None:
     """Verdict, how sure, where, how far; the head of the ranking; notes; what to do next."""
     from pneumo_ros.diagnosis.report.words import confidence, headline, how_far, next_steps, place_words
 
-    summary = found.to_json()
     console.print(f"[bold]{escape(headline(summary, phrases))}[/bold]", soft_wrap=True)
     console.print(f"{found.verdict} ({confidence(summary)})", highlight=False)
     told = found.verdict != "not_testable"
@@ -157,7 +173,7 @@ def _show(console: Console, found: Diagnosis, phrases: Mapping[str, str], fit: S
         _show_edit(console, found.edit)
     for note in found.notes:
         console.print(f"note: {note}", highlight=False, markup=False)
-    for step in next_steps(summary, [log.name for log in fit]):
+    for step in next_steps(summary, fit):
         console.print(f"next: {step}", highlight=False, markup=False)
 
 
@@ -198,7 +214,8 @@ def _show_edit(console: Console, edit: EditTest) -> None:
     )
 
 
-def _bar(console: Console) -> Progress:
+def progress_bar(console: Console) -> Progress:
+    """How far the diagnosis is."""
     return Progress(
         TextColumn("{task.description:42.42}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=console
     )

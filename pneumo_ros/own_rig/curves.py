@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
@@ -111,7 +112,7 @@ def _signal(model: OwnRig, parts: Sequence[Active], record: OwnRecord, step: boo
 def _points(model: OwnRig, own: Sequence[Active], found: Found, cov: Array, binned: bool) -> Array:
     """(B, 5) curve with its 90 % band by linear propagation of the values' covariance."""
     x, y = found(own)
-    bins, centres, weight = _bins(x) if binned else (np.arange(len(x)), x, np.full(len(x), 1.0 / len(x)))
+    bins, centres, weight = _bins(x) if binned else (np.arange(len(x), dtype=np.intp), x, np.full(len(x), 1.0 / len(x)))
     mean = _means(y, bins, len(centres))
     slopes = []
     for part, one in enumerate(own):
@@ -125,7 +126,7 @@ def _points(model: OwnRig, own: Sequence[Active], found: Found, cov: Array, binn
     return np.column_stack([centres, mean, mean - band, mean + band, weight])
 
 
-def _bins(x: Array) -> tuple[Array, Array, Array]:
+def _bins(x: Array) -> tuple[NDArray[np.intp], Array, Array]:
     low, high = np.quantile(x, [0.002, 0.998])
     edges = np.linspace(low, max(high, low + 1e-12), BINS + 1)
     bins = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
@@ -136,5 +137,5 @@ def _bins(x: Array) -> tuple[Array, Array, Array]:
     return index[bins], np.bincount(bins, x, BINS)[kept] / counts[kept], counts[kept] / len(x)
 
 
-def _means(y: Array, bins: Array, count: int) -> Array:
+def _means(y: Array, bins: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.bincount(bins, y, count) / np.maximum(np.bincount(bins, minlength=count), 1))

@@ -24,7 +24,7 @@ from pneumo_ros.slots.laws import Measures
 
 EVIDENT = 0.1  # of a channel's standard deviation
 WINDOWS = 12  # in a record, at most
-LARGE = 5.0  # evident sizes that friction may have before its turnover is widened
+LARGE = 20.0  # evident sizes that friction may have before its turnover is widened
 SEARCHES = 12  # steps in the search of a size
 FINEST, MOST_STEPS = 0.7, 40  # rad in a sub-step; sub-steps in a period
 NARROW = 0.04  # of the usual rate: what friction may turn over within
@@ -138,7 +138,7 @@ class Scaler:
     def _run(self, P: Array | None, inside: Array) -> Array:
         """Outputs of all windows, one after the other."""
         slots = len(inside)
-        on = np.zeros(slots, bool) if P is None else P.any(axis=1)
+        on = np.zeros(slots, bool) if P is None else np.asarray(P.any(axis=1), dtype=bool)
         values = np.zeros((slots, VALUES)) if P is None else P
         return np.vstack([self._one(w, on, values, inside)[0] for w in self.windows])
 

@@ -143,7 +143,7 @@ class OwnRig:
         for one in active:
             if one.site in places:
                 P[places.index(one.site), list(self.library[one.effect].columns[one.site])] += one.values
-        return P, P.any(axis=1)
+        return P, np.asarray(P.any(axis=1), dtype=bool)
 
     def signal_values(self, place: str, active: Sequence[Active]) -> Array | None:
         """Values of a signal's slot (V,); None where nothing is at work."""

@@ -108,7 +108,7 @@ def _function(module: ModuleType, path: Path, name: str, arguments: int) -> Call
     if count != arguments:
         raise InputError(f"{name} takes another number of arguments", where=path, key=name, value=count,
                          allowed="x, u, p, f: state, inputs, parameters, what acts at the slots")  # fmt: skip
-    return function  # type: ignore[no-any-return]
+    return function
 
 
 def _slots(module: ModuleType, path: Path, rig: Description) -> tuple[Slot, ...]:

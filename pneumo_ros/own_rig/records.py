@@ -109,7 +109,7 @@ def read_record(path: Path, rig: Description) -> OwnRecord:
     _check_moves(path, rig, measured, weight)
     whole = np.column_stack(inputs) if inputs else np.zeros((len(base), 0))
     return OwnRecord(path.name if path.is_dir() else path.stem, rig.name, tuple(rig.channels), period, measured, weight,
-                     whole, noise, 0.0, pace_of_signals(measured, period), rig.model_form,
+                     whole, noise, 0.0, pace_of_signals(measured, period, noise), rig.model_form,
                      tuple(_timing(name, held[name], base[0]) for name in rig.channels))  # fmt: skip
 
 

@@ -64,7 +64,7 @@ def _of_table(path: Path, spec: SignalSpec, rig: Description) -> Sampled:
     columns = table_of(path)
     values = _column(columns, spec.field, path, spec.name)
     if isinstance(rig.time, float):
-        return Sampled(np.arange(len(values)) * rig.time, values)
+        return Sampled(np.asarray(np.arange(len(values)) * rig.time, dtype=float), values)
     if rig.time is None:
         raise InputError("a table needs its time", where=rig.path, key="time",
                          allowed="{field: t, unit: s}, or the time from row to row, 4 s")  # fmt: skip
@@ -186,7 +186,7 @@ def _of_bag(path: Path, spec: SignalSpec) -> Sampled:
         raise not_one_of("the log has no such topic", spec.topic, log.topics, where=path, key=spec.name)
     columns = log.columns(spec.topic)
     values = _field(columns.arrays, columns.texts, spec.field, path, spec.name)
-    return Sampled(columns.stamp_ns * SECOND, values)
+    return Sampled(np.asarray(columns.stamp_ns * SECOND, dtype=float), values)
 
 
 def _field(arrays: Mapping[str, Any], texts: Mapping[str, Any], field: str, path: Path, key: str) -> Array:

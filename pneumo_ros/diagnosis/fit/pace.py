@@ -20,6 +20,7 @@ FEWEST_BLOCKS, MOST_BLOCKS = 9, 48  # of a whole record: three turns of three; b
 PERIODS = 1.5  # of the slowest motion in a block, where the record is long enough
 FASTEST = 0.99  # share of a channel's power below its bandwidth
 SAMPLES = 20.0  # fit samples in the period of the fastest motion
+FEWEST_FREE = 30.0  # samples that a record is worth, however smooth: what is left of it need not be
 FEWEST_SAMPLES = 240  # fit samples of a record that averaging leaves
 SHORTEST_SETTLE, SETTLED = 8, 0.25  # rows; periods of the slowest motion
 LONGEST_SETTLE = 0.1  # of the record
@@ -56,38 +57,40 @@ def pace_of(record: Any) -> Pace:
     return found if isinstance(found, Pace) else HALF_CAR
 
 
-def pace_of_signals(measured: Array, period: float) -> Pace:
-    """The pace of (N, C) uniform samples, ``period`` s apart.
+def pace_of_signals(measured: Array, period: float, noise: Array | None = None) -> Pace:
+    """The pace of (N, C) uniform samples, ``period`` s apart, of noise (C,).
 
     Blocks hold the slowest motion, averages keep the fastest, and a free run's error is worth as many samples as the
-    signal has degrees of freedom (twice its bandwidth times its length).
+    signal has degrees of freedom (twice its bandwidth times its length), but not less than :data:`FEWEST_FREE`.
     """
     rows = len(measured)
-    slow, fast = motions(measured, period)
+    slow, fast = motions(measured, period, noise)
     whole = rows * period
     block = float(np.clip(PERIODS / slow, whole / MOST_BLOCKS, whole / FEWEST_BLOCKS))
     averaged = int(np.clip(min(1.0 / (SAMPLES * fast * period), rows / FEWEST_SAMPLES), 1, 50))
-    correlation = max(1.0, 1.0 / (2.0 * fast * averaged * period))
+    correlation = max(1.0, min(1.0 / (2.0 * fast * averaged * period), rows / averaged / FEWEST_FREE))
     settle = float(np.clip(SETTLED / slow, SHORTEST_SETTLE * period, max(LONGEST_SETTLE * whole, period)))
     return Pace(block, averaged, correlation, settle, min(block, whole / 5.0), 1.0 / slow)
 
 
-def motions(measured: Array, period: float) -> tuple[float, float]:
+def motions(measured: Array, period: float, noise: Array | None = None) -> tuple[float, float]:
     """Frequencies (Hz) of the slowest strong motion and below which nearly all power lies; medians over channels."""
     rows = len(measured)
     lowest = 1.0 / (rows * period)
     if rows < 16:
         return lowest, 0.5 / period
-    found = [_band(column, period) for column in measured.T if np.std(column) > 0.0]
+    sigma = np.zeros(measured.shape[1]) if noise is None else noise
+    found = [_band(column, period, s) for column, s in zip(measured.T, sigma, strict=True) if np.std(column) > 0.0]
     if not found:
         return lowest, 4.0 * lowest
     slow, fast = np.median(np.array(found), axis=0)
     return float(max(slow, lowest)), float(np.clip(fast, 2.0 * lowest, 0.5 / period))
 
 
-def _band(column: Array, period: float) -> tuple[float, float]:
+def _band(column: Array, period: float, sigma: float) -> tuple[float, float]:
     window = np.hanning(len(column))
     power = np.abs(np.fft.rfft((column - column.mean()) * window)) ** 2
+    power = np.maximum(power - 4.0 * sigma**2 * float(window @ window), 1e-12 * power.max())
     frequency = np.fft.rfftfreq(len(column), period)
     share = np.cumsum(power) / power.sum()
     slow = frequency[int(np.searchsorted(share, 0.5))]

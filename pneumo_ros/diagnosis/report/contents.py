@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.diagnosis.report.rig_map import draw_map
@@ -24,16 +25,34 @@ from pneumo_ros.diagnosis.report.words import (
     sentence,
     winner,
 )
-from pneumo_ros.diagnosis.signals import MEASURED, Signals
+from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.where import Law
 
-ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
+ZOOM = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off
 SHOWN_CHANNELS = 2  # the rest is folded away
 TITLES = {
     "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
     "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
 }  # fmt: skip
 UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+
+
+@dataclass(frozen=True)
+class RigCard:
+    """How the page speaks of a rig: its name, what its channels are called and shown in, and its picture.
+
+    ``units`` : channel -> unit shown and factor to it; ``picture`` : shares by place -> SVG
+    """
+
+    name: str
+    titles: Mapping[str, str]
+    units: Mapping[str, tuple[str, float]]
+    picture: Callable[[Mapping[str, float]], str]
+
+
+def half_car_card(name: str) -> RigCard:
+    """The half car's."""
+    return RigCard(name, TITLES, UNITS, draw_map)
 
 
 @dataclass(frozen=True)
@@ -46,6 +65,7 @@ class Findings:
     trajectories : "nominal", "refit" and "best" -> (N, 6) free runs on the held-out log
     holdout : the held-out log
     fit_names : names of the logs fitted
+    card : how the page speaks of the rig
     phrases : effect id -> what it is, in words
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
@@ -55,8 +75,9 @@ class Findings:
 
     summary: Mapping[str, Any]
     trajectories: Mapping[str, Array]
-    holdout: Signals
+    holdout: Any
     fit_names: Sequence[str]
+    card: RigCard
     phrases: Mapping[str, str] = field(default_factory=dict)
     regimes: Sequence[str] = ()
     conditional: Mapping[str, float] = field(default_factory=dict)
@@ -71,7 +92,7 @@ def contents(found: Findings) -> dict[str, Any]:
     shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", []) if told}
     charts = _charts(found)
     return {
-        "title": f"Gap of {found.holdout.rig.name}",
+        "title": f"Gap of {found.card.name}",
         "verdict": summary["verdict"],
         "headline": headline(summary, found.phrases),
         "confidence": confidence(summary),
@@ -80,7 +101,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "next_steps": next_steps(summary, found.fit_names),
         "waterfall": waterfall(budget_rows(summary)) if told and summary.get("budget") else "",
         "measured": _measured(summary) if told else [],
-        "map": draw_map(shares),
+        "map": found.card.picture(shares),
         "places": [
             {"name": place, "words": place_words(place), "share": share}
             for place, share in shares.items()
@@ -104,7 +125,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "topics": found.holdout.topics,
         "fit_names": list(found.fit_names),
         "holdout_name": found.holdout.name,
-        "rig": found.holdout.rig.name,
+        "rig": found.card.name,
         "seconds": len(found.holdout.measured) * found.holdout.period,
     }
 
@@ -149,15 +170,15 @@ def _charts(found: Findings) -> list[dict[str, str]]:
 
 
 def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
-    log, name = found.holdout, MEASURED[c]
-    unit, factor = UNITS[name]
+    log, name = found.holdout, list(found.card.units)[c]
+    unit, factor = found.card.units[name]
     measured = np.where(log.weight[:, c] > 0, log.measured[:, c], np.nan) * factor
     lines = [Line("log", "log", measured[first:last])]
     lines += [Line(key, key, run[first:last, c] * factor) for key, run in found.trajectories.items() if key in _DRAWN]
     left = [Line(key, key, measured - found.trajectories[key][:, c] * factor) for key in ("refit", "best")]
     gaps = found.summary["gap"].get("per_channel", {}).get(name, {})
     return {
-        "title": TITLES[name],
+        "title": found.card.titles[name],
         "name": name,
         "overlay": plot(log.time[first:last], lines, unit),
         "residual": plot(log.time, left, unit, height=120, band=2.0 * float(log.noise[c]) * factor),
@@ -170,9 +191,9 @@ def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
 _DRAWN = ("nominal", "refit", "best")
 
 
-def _zoom(log: Signals, refit: Array) -> tuple[int, int]:
+def _zoom(log: Any, refit: Array) -> tuple[int, int]:
     count = len(log.measured)
-    rows = min(count, round(ZOOM / log.period))
+    rows = min(count, round(ZOOM * pace_of(log).period / log.period))
     error = np.mean(((log.measured - refit) * log.weight / log.scale) ** 2, axis=1)
     total = np.concatenate([[0.0], np.cumsum(error)])
     first = int(np.argmax(total[rows:] - total[:-rows])) if count > rows else 0

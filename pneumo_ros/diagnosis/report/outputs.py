@@ -11,7 +11,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, total_gap
-from pneumo_ros.diagnosis.report.contents import Findings
+from pneumo_ros.diagnosis.report.contents import Findings, half_car_card
 from pneumo_ros.diagnosis.report.page import write_report
 from pneumo_ros.diagnosis.report.residual_log import write_residual_log
 from pneumo_ros.diagnosis.result import Diagnosis, write_json
@@ -85,6 +85,7 @@ def _findings(
         trajectories=runs,
         holdout=holdout,
         fit_names=[log.name for log in fit],
+        card=half_car_card(holdout.rig.name),
         phrases={name: effect.summary for name, effect in model.library.items()},
         regimes=_sentences(where, holdout, error) if telling else [],
         conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),

@@ -73,17 +73,21 @@ def next_steps(summary: Mapping[str, Any], logs: Sequence[str] = ("FIT.mcap",)) 
     if verdict == "none":
         steps.append("Keep the model. Its re-estimated parameters are worth using: --save-rig RIG.yaml writes them.")
     elif verdict == "unknown":
-        steps.append(f"Look at {_first_place(summary) or 'the curves below'}. An idea becomes a candidate as a Python "
-                     "file: --effect MY_EFFECT.py (docs/diagnosis.md shows one).")  # fmt: skip
+        idea = ("a further slot of rig.py (docs/your-rig.md)" if summary.get("rig_model") else
+                "a Python file: --effect MY_EFFECT.py (docs/diagnosis.md shows one)")  # fmt: skip
+        steps.append(f"Look at {_first_place(summary) or 'the curves below'}. An idea becomes a candidate as {idea}.")
     else:
+        taken = "--rig" if summary.get("rig_model") else "--rig of every verb"
         steps.append(f"Look at {_first_place(summary) or 'it'} on the rig, or keep the effect in the model: "
-                     "--save-rig RIG.yaml writes it for --rig of every verb.")  # fmt: skip
+                     f"--save-rig RIG.yaml writes it for {taken}.")  # fmt: skip
     return steps
 
 
 def _record_again(summary: Mapping[str, Any]) -> str:
     if _forbidden(summary):
         return "Mend what is listed under what limits this, and record the session again."
+    if summary.get("rig_model"):
+        return "Record a log that moves more, or longer."
     return ("Record a session that moves more: a rougher road (pneumo run --road D, or E) with the valves at work, "
             "15 s or longer.")  # fmt: skip
 
@@ -109,7 +113,11 @@ def place_words(place: str) -> str:
         "body_heave": "the body (up and down)", "body_pitch": "the body (pitch)", "road_input": "the road input",
         "supply": "the air supply",
     }  # fmt: skip
+    if place.startswith("input:"):
+        return f"the input {place.removeprefix('input:').replace('_', ' ')}"
     end, _, part = place.partition("_")
+    if place not in words and end not in ("front", "rear"):
+        return f"the slot {place.replace('_', ' ')}"
     parts = {"air": "air and valve", "force": "spring force"}
     return words.get(place, f"the {end} {parts.get(part, part)}")
 

@@ -14,7 +14,7 @@ import pytest
 from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.diagnosis.report import Findings, render, write_outputs, write_report, write_residual_log
-from pneumo_ros.diagnosis.report.contents import readable, rounded
+from pneumo_ros.diagnosis.report.contents import half_car_card, readable, rounded
 from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
 from pneumo_ros.diagnosis.report.words import confidence, headline, next_steps, place_words
@@ -55,7 +55,14 @@ def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
                 "per_channel": {name: {"nominal": 1.2, "refit": 0.4, "best": 0.01} for name in MEASURED}},
     }  # fmt: skip
     runs = {"nominal": clean + 3 * log.scale, "refit": clean + 0.4 * log.scale, "best": clean}
-    return Findings(summary, runs, log, ["fit.mcap"], {"leak": "the spring leaks", "orifice_coefficient": "an orifice"})
+    return Findings(
+        summary,
+        runs,
+        log,
+        ["fit.mcap"],
+        half_car_card(log.rig.name),
+        {"leak": "the spring leaks", "orifice_coefficient": "an orifice"},
+    )
 
 
 class Balance(HTMLParser):

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`pneumo diagnose --rig-model rig.py`: any rig, by one file of physics and one of names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pneumo_ros.cli.existing import refuse_old_diagnosis
+from pneumo_ros.cli.terminal import Console
+from pneumo_ros.errors import InputError
+
+
+def diagnose_own(
+    console: Console,
+    model: Path,
+    fit: Sequence[Path],
+    holdout: Path | None,
+    output: Path,
+    rig: Path | None,
+    without: Sequence[str],
+    save_rig: Path | None,
+    pairs: bool,
+    overwrite: bool,
+) -> None:
+    """Diagnose logs of one's own rig, write the files and tell the verdict.
+
+    Raises
+    ------
+    InputError
+        for whatever cannot be used, in one line.
+    """
+    from pneumo_ros.own_rig.from_files import rig_file_of
+
+    _check_files(fit, holdout, model, rig_file_of(model, rig))
+    refuse_old_diagnosis(output, save_rig, overwrite, [rig_file_of(model, rig)])
+    from pneumo_ros.cli.diagnose import progress_bar, show
+    from pneumo_ros.diagnosis.diagnose import Options
+    from pneumo_ros.diagnosis.report import claim_folder
+    from pneumo_ros.own_rig import outputs
+    from pneumo_ros.own_rig.from_files import prepared
+
+    claim_folder(output)
+    task = prepared(model, fit, holdout, rig, without)
+    with progress_bar(console) as progress:
+        bar = progress.add_task("diagnosing", total=1.0)
+        found = task.diagnose(
+            Options(pairs=pairs), lambda share, what: progress.update(bar, completed=share, description=what)
+        )
+    files = outputs.write_outputs(output, found, task.model, task.fit, task.holdout)
+    if save_rig is not None:
+        files.append(outputs.save_rig(found, task.model, save_rig))
+    show(console, found, outputs.summary_of(found), outputs.phrases_of(task.model), [log.name for log in task.fit])
+    console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+
+
+def _check_files(fit: Sequence[Path], holdout: Path | None, model: Path, rig: Path) -> None:
+    """What is read is there, before seconds of imports."""
+    named = [("--rig-model", model), ("--rig", rig), *(("FIT", path) for path in fit)]
+    for key, path in (*named, *([("--holdout", holdout)] if holdout is not None else [])):
+        if not path.exists():
+            beside = "write it beside rig.py, under its name" if key == "--rig" else "check the name"
+            raise InputError("no such file", where=path, key=key, remedy=beside)
