@@ -16,6 +16,7 @@ from pneumo_ros.own_rig.quantities import Written, conversion, quantity
 
 KEYS = ("rig", "time", "start", "end", "channels", "inputs", "states", "parameters", "model_form", "families",
         "effects", "scales")  # fmt: skip
+MODEL_FORM = 0.05  # a model on one page is seldom truer than this; state what yours is worth
 SIGNAL_KEYS = ("field", "topic", "unit", "sign", "noise", "hold", "beside", "rate_of", "default")
 
 
@@ -67,7 +68,7 @@ class Description:
     time : where tables hold the time, or s between rows; None: bags, which stamp
     start, end : s that are left out of each log, before and after; ``start_when``: a channel whose first move starts
     channels, inputs, parameters, states : by name, in order
-    model_form : share of each channel's std that the maker holds the model form to be worth
+    model_form : share of each channel's std that the maker holds the model form to be worth; 5 % unless stated
     families : slot's place -> families that may sit there
     effects, scales : of a rig that a diagnosis has saved: effects that stand, and their slots' scales
     """
@@ -82,7 +83,7 @@ class Description:
     inputs: Mapping[str, SignalSpec]
     parameters: Mapping[str, Written]
     states: Mapping[str, Start]
-    model_form: float = 0.0
+    model_form: float = MODEL_FORM
     families: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     effects: tuple[Active, ...] = ()
     scales: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
@@ -131,7 +132,7 @@ def _described(table: Mapping[str, Any], path: Path) -> Description:
         states={
             str(k): _start(v, channels, inputs, path, f"states.{k}") for k, v in _table(table, "states", path).items()
         },
-        model_form=_share(table.get("model_form", 0.0), path),
+        model_form=_share(table.get("model_form", MODEL_FORM), path),
         families={str(k): _names(v, path, f"families.{k}") for k, v in _table(table, "families", path).items()},
         effects=tuple(_effect(one, path) for one in _list(table, "effects", path)),
         scales={str(k): tuple(float(x) for x in v) for k, v in _table(table, "scales", path).items()},

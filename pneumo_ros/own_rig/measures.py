@@ -2,7 +2,7 @@
 """Scales of a rig's slots, from its logs: what its rates and travels are, and what would be an evident size there.
 
 The nominal model is run in short windows, each from the log's own state, so that it stays near the data even where a
-free run would not. A size is evident that moves the outputs of such a window by a tenth of what the log moves.
+free run would not. A size is evident that moves the outputs of such a window by four tenths of what the log moves.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pneumo_ros.slots import signal as si
 from pneumo_ros.slots.kinds import Flow, Force, Slot
 from pneumo_ros.slots.laws import Measures
 
-EVIDENT = 0.1  # of a channel's standard deviation
+EVIDENT = 0.4  # of a channel's standard deviation
 WINDOWS = 12  # in a record, at most
 LARGE = 20.0  # evident sizes that friction may have before its turnover is widened
 SEARCHES = 12  # steps in the search of a size

@@ -39,6 +39,7 @@ class OwnRecord:
     measured, weight : (N, C); weight 1 where a real sample stands behind the value
     inputs : (N, U); linear between rows, or held
     noise : (C,)
+    slow_noise : (C,) part of it that wanders: what is stated beyond the white noise that the data show
     since : s from the beginning of its log to row 0
     pace : lengths, of the whole log
     model_form : share of each channel's std that the maker holds the model form to be worth
@@ -52,6 +53,7 @@ class OwnRecord:
     weight: Array
     inputs: Array
     noise: Array
+    slow_noise: Array
     since: float
     pace: Pace
     model_form: float = 0.0
@@ -105,11 +107,12 @@ def read_record(path: Path, rig: Description) -> OwnRecord:
     measured, weight = (np.column_stack([c[k] for c in columns]) for k in (0, 1))
     inputs = [_driven(base, held[name], spec.hold) for name, spec in rig.inputs.items()]
     period = float(base[1] - base[0])
-    noise = np.array([_noise(spec, measured[:, k], weight[:, k], path) for k, spec in enumerate(rig.channels.values())])
+    noises = [_noise(spec, measured[:, k], weight[:, k], path) for k, spec in enumerate(rig.channels.values())]
+    noise, slow = (np.array([one[k] for one in noises]) for k in (0, 1))
     _check_moves(path, rig, measured, weight)
     whole = np.column_stack(inputs) if inputs else np.zeros((len(base), 0))
     return OwnRecord(path.name if path.is_dir() else path.stem, rig.name, tuple(rig.channels), period, measured, weight,
-                     whole, noise, 0.0, pace_of_signals(measured, period, noise), rig.model_form,
+                     whole, noise, slow, 0.0, pace_of_signals(measured, period, noise), rig.model_form,
                      tuple(_timing(name, held[name], base[0]) for name in rig.channels))  # fmt: skip
 
 
@@ -198,12 +201,15 @@ def _driven(base: Array, one: Sampled, hold: bool) -> Array:
     return np.asarray(one.values[np.clip(np.searchsorted(one.time, base, side="right") - 1, 0, len(one.time) - 1)])
 
 
-def _noise(spec: SignalSpec, values: Array, weight: Array, path: Path) -> float:
-    found = spec.noise if spec.noise is not None else white_noise(values, weight)
+def _noise(spec: SignalSpec, values: Array, weight: Array, path: Path) -> tuple[float, float]:
+    """Standard deviation of a channel's noise, and of the part of it that wanders."""
+    white = white_noise(values, weight)
+    found = white if spec.noise is None else spec.noise
     if not np.isfinite(found):
         raise InputError("the noise cannot be told from the data", where=path, key=spec.name,
                          remedy="state it: noise: 0.002 mm")  # fmt: skip
-    return max(float(found), 1e-6 * float(np.std(values)), 1e-15)
+    slow = np.sqrt(max(found**2 - white**2, 0.0)) if np.isfinite(white) else 0.0
+    return max(float(found), 1e-6 * float(np.std(values)), 1e-15), float(slow)
 
 
 def _check_moves(path: Path, rig: Description, measured: Array, weight: Array) -> None:

@@ -22,8 +22,8 @@ FLOW, FLOW_SQUARE = 2, 3
 RELIEF, RELIEF_DEPTH = 4, 5
 DROOP, DROOP_TIME = 6, 7
 HEAT, HEAT_TIME = 8, 9
-CONSTANT = 10
-LAWS = 11
+POWER, EXPONENT = 10, 11
+LAWS = 12
 
 # Atoms.
 A_HOLE, A_GAP = LAWS, LAWS + 1
@@ -101,11 +101,14 @@ def flow(c: Array, z: Array, P: Array, S: Array) -> float:
     up, down, nominal = c[0], c[1], c[2]
     gas = S[S_GAS] > 0.5
     hole, gap, share = through_hole(up, down, gas), through_gap(up, down, gas, S[S_UP]), nominal / S[S_FLOW]
-    out = P[CONSTANT] + P[HOLE] * hole + P[GAP] * gap + nominal * (P[FLOW] + P[FLOW_SQUARE] * abs(share))
+    out = P[HOLE] * hole + P[GAP] * gap + nominal * (P[FLOW] + P[FLOW_SQUARE] * abs(share))
     out += (
         P[RELIEF] * max(0.0, up - (S[S_LOW] + S[S_SWING] - P[RELIEF_DEPTH]))
         - P[DROOP] * nominal * z[Z_DROOP] / S[S_FLOW]
     )
+    if P[POWER] != 0.0:
+        d = up - down
+        out += P[POWER] * d * (abs(d) / S[S_UP] + 1e-9) ** (P[EXPONENT] - 1.0)
     if P[HEAT] != 0.0:
         out += P[HEAT] * z[Z_HEAT] / P[HEAT_TIME]
     out += P[STEADY] + P[A_HOLE] * hole + P[A_GAP] * gap

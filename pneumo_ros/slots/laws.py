@@ -51,6 +51,7 @@ class Knob:
     typical : from the slot's measures
     low, high : bounds, in typical values
     size : zero means that the law is absent
+    open_ended : its bounds are other laws of the family: a fit that stops there says nothing against it
     starts : further values to start from, in typical ones
     """
 
@@ -61,7 +62,8 @@ class Knob:
     low: float = 0.0
     high: float = MOST
     size: bool = True
-    starts: tuple[float, ...] = (10.0,)
+    starts: tuple[float, ...] = (8.0,)
+    open_ended: bool = False
 
 
 @dataclass(frozen=True)
@@ -101,9 +103,9 @@ def _share(m: Measures) -> float:
 
 def _shape(
     name: str, unit: str, column: int, typical: Callable[[Measures], float], low: float, high: float,
-    starts: tuple[float, ...],
+    starts: tuple[float, ...], open_ended: bool = True,
 ) -> Knob:  # fmt: skip
-    return Knob(name, unit, column, typical, low, high, size=False, starts=starts)
+    return Knob(name, unit, column, typical, low, high, size=False, starts=starts, open_ended=open_ended)
 
 
 FORCES, CONTACT = ("force", "contact"), ("contact",)
@@ -133,7 +135,7 @@ FORCE_LAWS = (
         (Knob("damping_out", NS, fo.DAMPING_OUT, _per_rate), Knob("damping_in", NS, fo.DAMPING_IN, _per_rate))),
     Law("viscous_damping.degressive", FORCES, "damping that grows ever less with the rate",
         (Knob("damping", NS, fo.DEGRESSIVE, _per_rate),
-         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.3, 5.0, (0.5,)))),
+         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.7, 5.0, (3.0,)))),
     Law("viscous_damping.quadratic", FORCES, "damping with the square of the rate",
         (Knob("square_damping", "{unit} s2/{travel}2", fo.SQUARE_DAMPING, lambda m: m.size / m.rate**2),)),
     Law("hysteresis", FORCES, "rate-independent hysteresis (Bouc-Wen)",
@@ -160,7 +162,7 @@ FORCE_LAWS = (
          _shape("fading_time", "s", fo.MEMORY_TIME, lambda m: 0.1 * m.period, 0.05, 20.0, (0.3, 5.0)))),
     Law("resonance", FORCES, "something that rings: a mass on a spring",
         (Knob("ringing_mass", "{unit} s2/{travel}", fo.MASS, lambda m: m.size * m.period / m.rate / 6.0),
-         _shape("ringing_frequency", "rad/s", fo.FREQUENCY, lambda m: 12.0 / m.period, 0.2, 8.0, (0.5, 2.0, 4.0)),
+         _shape("ringing_frequency", "rad/s", fo.FREQUENCY, lambda m: 12.0 / m.period, 0.2, 8.0, (0.5, 2.0, 4.0), False),
          _shape("ringing_damping", "1", fo.DAMPING_RATIO, lambda m: 0.05, 0.1, 10.0, ()))),
     Law("offset", FORCES, "a constant force", (Knob("constant_force", N, fo.CONSTANT, _size, -MOST),)),
     Law("backlash", CONTACT, "play before the parts touch",
@@ -175,6 +177,9 @@ FLOW_LAWS = (
     Law("leak", FLOW, "a hole", (Knob("conductance", "{unit}/{travel}", fl.HOLE, lambda m: m.size / m.high),)),
     Law("leak.laminar", FLOW, "a long narrow gap",
         (Knob("conductance", "{unit}/{travel}", fl.GAP, lambda m: m.size / m.high),)),
+    Law("leak.opening", FLOW, "a gap that the pressure itself opens",
+        (Knob("conductance", "{unit}/{travel}", fl.POWER, lambda m: m.size / m.high),
+         _shape("exponent", "1", fl.EXPONENT, lambda m: 1.0, 0.5, 3.0, (0.6, 1.5)))),
     Law("flow_coefficient", FLOW, "an opening that passes another share of the flow",
         (Knob("share", "1", fl.FLOW, _share, -MOST),), needs_load=True),
     Law("flow_coefficient.curved", FLOW, "an opening whose share changes with the flow",
@@ -187,8 +192,7 @@ FLOW_LAWS = (
          _shape("sag_time", "s", fl.DROOP_TIME, lambda m: 0.1 * m.period, 0.01, 30.0, (0.2, 5.0))), needs_load=True),
     Law("heat", FLOW, "filling has warmed or cooled what settles now",
         (Knob("settling", "{unit} s", fl.HEAT, lambda m: 0.1 * m.size * m.whole, -MOST),
-         _shape("settling_time", "s", fl.HEAT_TIME, lambda m: 0.04 * m.whole, 0.05, 4.0, (0.25, 3.0)))),
-    Law("offset", FLOW, "a constant flow", (Knob("constant_flow", "{unit}", fl.CONSTANT, _size, -MOST),)),
+         _shape("settling_time", "s", fl.HEAT_TIME, lambda m: 0.04 * m.whole, 0.05, 4.0, (0.25, 3.0), False))),
 )  # fmt: skip
 
 SIGNAL_LAWS = (

@@ -92,7 +92,9 @@ def _parameter(knob: Knob, m: Measures) -> EffectParameter:
     typical = knob.typical(m)
     starts = tuple(s * typical for s in knob.starts if knob.low <= s <= knob.high)
     unit = knob.unit.format(unit=m.unit, travel=m.travel_unit)
-    return EffectParameter(knob.name, unit, knob.low * typical, knob.high * typical, typical, knob.size, starts)
+    low, high = knob.low * typical, knob.high * typical
+    ends = (0.0, low, high) if knob.open_ended else (0.0,)
+    return EffectParameter(knob.name, unit, low, high, typical, knob.size, starts, ends)
 
 
 def _atoms(name: str, summary: str, slot: Slot, m: Measures, columns: Sequence[int], every_sign: bool) -> SlotEffect:

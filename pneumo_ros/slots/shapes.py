@@ -93,8 +93,8 @@ ROWS: dict[str, tuple[Row, ...]] = {
     "sensor": (VALUES, LIMITS, LAGS, DELAYS),
 }
 _FORCE = {
-    "coulomb_friction": (*OUT.columns(0, 3), *IN.columns(0, 3), *LOADED.columns(), *SLIDERS.columns(0, 3)),
-    "viscous_damping": (*OUT.columns(3), *IN.columns(3), *LINEAR.columns(), *SQUARES.columns()),
+    "coulomb_friction": (*OUT.columns(0, 4), *IN.columns(0, 4), *LOADED.columns(), *SLIDERS.columns(0, 3)),
+    "viscous_damping": (*OUT.columns(4), *IN.columns(4), *LINEAR.columns(), *SQUARES.columns()),
     "hysteresis": SLIDERS.columns(2),
     "stop": (*BELOW.columns(), *ABOVE.columns(), *TOUCH.columns()),
     "spring_error": POWERS.columns(),

@@ -116,9 +116,14 @@ class Problem:
 
     @cached_property
     def noise(self) -> Array:
-        """(n, C) standard deviation of the sensor noise after averaging."""
-        pairs = zip(self.records, self._real, strict=True)
-        return np.vstack([np.asarray(r.noise) / np.sqrt(np.maximum(real.sum(axis=1), 1.0)) for r, real in pairs])
+        """(n, C) standard deviation of the sensor noise after averaging; what of it wanders does not average out."""
+        out = []
+        for r, real in zip(self.records, self._real, strict=True):
+            noise, slow = np.asarray(r.noise), np.asarray(getattr(r, "slow_noise", 0.0))
+            white = np.sqrt(np.maximum(noise**2 - slow**2, 0.0)) if np.any(slow) else noise
+            fast = white / np.sqrt(np.maximum(real.sum(axis=1), 1.0))
+            out.append(np.hypot(fast, slow) if np.any(slow) else fast)
+        return np.vstack(out)
 
     @cached_property
     def _real(self) -> list[Array]:
