@@ -90,8 +90,9 @@ def tell(log: Path, what: str, found: Diagnosis, seconds: float | None = None) -
     """One line."""
     gap, place = found.gap, found.location[0][0] if found.location else "-"
     took = "" if seconds is None else f"  {seconds:.0f} s"
-    print(f"{log.stem:24s} {what:26s} {found.verdict:36s} {found.probability:.2f}  {place:18s} gap {gap.nominal:.3f} -> "
-          f"{gap.refit:.3f} -> {gap.best:.3f}{took}", flush=True)  # fmt: skip
+    told = f"{found.verdict:36s} {found.probability:.2f}  {place:18s}"
+    gaps = f"gap {gap.nominal:.3f} -> {gap.refit:.3f} -> {gap.best:.3f}"
+    print(f"{log.stem:24s} {what:26s} {told} {gaps}{took}", flush=True)
 
 
 if __name__ == "__main__":

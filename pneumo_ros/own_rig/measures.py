@@ -24,9 +24,10 @@ from pneumo_ros.slots.laws import Measures
 
 EVIDENT = 0.4  # of a channel's standard deviation
 WINDOWS = 12  # in a record, at most
-LARGE = 20.0  # evident sizes that friction may have before its turnover is widened
+LARGE = 5.0  # evident sizes that friction may have before its turnover is widened
 SEARCHES = 12  # steps in the search of a size
 FINEST, MOST_STEPS = 0.7, 40  # rad in a sub-step; sub-steps in a period
+FOR_FRICTION = 2  # sub-steps that friction alone is given: beyond them its turnover is widened
 NARROW = 0.04  # of the usual rate: what friction may turn over within
 UNIT = {"m": "m", "Pa": "Pa"}
 
@@ -93,9 +94,13 @@ class Scaler:
                 signals[slot.place] = S
                 swing, peak = float(S[si.S_SWING]), float(S[si.S_PEAK])
                 measures[slot.place] = Measures(swing, swing / slow, swing, 0.0, peak, peak, slow, whole, unit, unit)
-        steps = max([self.substeps, *(self._steps(measures[s.place], mobility[k])
-                                      for k, s in enumerate(self.physics.inside) if isinstance(s, Force))])  # fmt: skip
-        return Scaling(measures, inside, signals, mobility, min(steps, MOST_STEPS))
+        rubbed = [
+            self._steps(measures[s.place], mobility[k])
+            for k, s in enumerate(self.physics.inside)
+            if isinstance(s, Force)
+        ]
+        steps = max(self.substeps, min(max(rubbed, default=1), FOR_FRICTION))
+        return Scaling(measures, inside, signals, mobility, steps)
 
     def _steps(self, m: Measures, mobility: float) -> int:
         """Sub-steps in which evident friction turns over within a narrow band."""
@@ -123,6 +128,8 @@ class Scaler:
         for _ in range(SEARCHES):
             P = np.zeros((len(inside), VALUES))
             P[k, column] = size
+            if isinstance(self.physics.inside[k], Force):
+                P[k, fo.ATOMS_AT_WORK] = float(column >= fo.LAWS)
             change = (self._run(P, inside) - base) / self.spread
             moved = float(np.max(np.sqrt(np.mean(change**2, axis=0))))
             if not np.isfinite(moved):

@@ -143,7 +143,10 @@ class OwnRig:
         for one in active:
             if one.site in places:
                 P[places.index(one.site), list(self.library[one.effect].columns[one.site])] += one.values
-        return P, np.asarray(P.any(axis=1), dtype=bool)
+        on = np.asarray(P.any(axis=1), dtype=bool)
+        forces = self.terms == FORCE
+        P[forces, fo.ATOMS_AT_WORK] = P[forces, fo.LAWS : fo.ATOMS_AT_WORK].any(axis=1)
+        return P, on
 
     def signal_values(self, place: str, active: Sequence[Active]) -> Array | None:
         """Values of a signal's slot (V,); None where nothing is at work."""

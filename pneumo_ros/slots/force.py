@@ -49,7 +49,8 @@ POWERS = TOUCH + 2  # travel to the powers 1, 2, 3
 CENTRE = POWERS + 3  # travel clipped to S_CENTRE
 LAGGED = CENTRE + 3  # travel over its memories of S_TIMES
 STEADY = LAGGED + 3
-VALUES = STEADY + 1
+ATOMS_AT_WORK = STEADY + 1  # whether any atom is: laws alone are quick
+VALUES = STEADY + 2
 
 # Scales: columns of S.
 S_RATES, S_SLACKS, S_BELOW, S_ABOVE, S_CENTRE, S_TIMES = 0, 5, 10, 14, 18, 21
@@ -85,8 +86,12 @@ def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
     """Memories one step of ``h`` s later; ``c`` at its end."""
     moved = c[0] - z[Z_BEFORE]
     z[Z_BEFORE] = c[0]
-    for k in range(5):
-        z[Z_SLID + k] = clipped(z[Z_SLID + k] + moved / S[S_SLACKS + k], 1.0)
+    if P[ATOMS_AT_WORK] != 0.0:
+        for k in range(5):
+            z[Z_SLID + k] = clipped(z[Z_SLID + k] + moved / S[S_SLACKS + k], 1.0)
+        for k in range(3):
+            if P[LAGGED + k] != 0.0:
+                z[Z_LAGGED + k] = c[0] + (z[Z_LAGGED + k] - c[0]) * math.exp(-h / S[S_TIMES + k])
     if P[PRESLIDING] != 0.0:
         z[Z_PRE] = clipped(z[Z_PRE] + moved / P[PRESLIDING_TRAVEL], 1.0)
     if P[BOUC_WEN] != 0.0:  # exact for a monotonic move
@@ -95,8 +100,6 @@ def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
     if P[SLIDERS] != 0.0:
         for k in range(3):
             z[Z_THREE + k] = clipped(z[Z_THREE + k] + moved / (THREE[k] * P[SLIDERS_TRAVEL]), 1.0)
-    for k in range(3):
-        z[Z_LAGGED + k] = c[0] + (z[Z_LAGGED + k] - c[0]) * math.exp(-h / S[S_TIMES + k])
     if P[MEMORY] != 0.0:
         z[Z_MEMORY] = c[0] + (z[Z_MEMORY] - c[0]) * math.exp(-h / P[MEMORY_TIME])
     if P[MASS] != 0.0:
@@ -110,7 +113,8 @@ def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
 def force(c: Array, z: Array, P: Array, S: Array) -> float:
     """What acts, in the slot's unit."""
     x, v, load = c[0], c[1], c[2]
-    return _friction(v, load, z, P, S) + _damping(v, P) + _elastic(x, v, load, z, P, S) + _atoms(x, v, load, z, P, S)
+    out = _friction(v, load, z, P, S) + _damping(v, P) + _elastic(x, v, load, z, P, S)
+    return out + _atoms(x, v, load, z, P, S) if P[ATOMS_AT_WORK] != 0.0 else out
 
 
 @njit(cache=True, error_model="numpy")
