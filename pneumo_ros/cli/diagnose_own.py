@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -42,11 +43,11 @@ def diagnose_own(
 
     claim_folder(output)
     task = prepared(model, fit, holdout, rig, without)
+    threads = (os.cpu_count() or 1) if task.model.physics.kernel.compiled else 1
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
-        found = task.diagnose(
-            Options(pairs=pairs), lambda share, what: progress.update(bar, completed=share, description=what)
-        )
+        options = Options(pairs=pairs, threads=threads)
+        found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
     files = outputs.write_outputs(output, found, task.model, task.fit, task.holdout)
     if save_rig is not None:
         files.append(outputs.save_rig(found, task.model, save_rig))

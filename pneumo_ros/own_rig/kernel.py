@@ -136,7 +136,9 @@ def _text(names: Names, states: bool, shape: Sequence[int], cached: bool, compil
     lines = ["from __future__ import annotations", "from collections import namedtuple", "from numba import njit"]
     lines += [f"# made of {hashlib.sha256(made_of.encode()).hexdigest()}", f"CHANNELS = {len(names.channels)}"]
     lines += [f"{kind} = namedtuple({kind!r}, {list(fields)!r})" for kind, fields in kinds.items()]
-    lines += [f'compiled = njit(error_model="numpy", cache={cached})' if compiled else "compiled = lambda f: f"]
+    lines += [
+        f'compiled = njit(error_model="numpy", nogil=True, cache={cached})' if compiled else "compiled = lambda f: f"
+    ]
     lines += ["@compiled", "def derivative(x, u, p, f, out):"]
     lines += _assigned(f"rhs({x}, {u}, {p}, {f})", len(names.states)) if states else [" pass"]
     lines += ["@compiled", "def reading(x, u, p, f, out):"]

@@ -19,7 +19,8 @@ def sines(seed: int, amplitudes: tuple[float, ...], frequencies: tuple[float, ..
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(amplitudes))
 
     def value(t: float) -> float:
-        return float(sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in zip(amplitudes, frequencies, phases, strict=True)))  # fmt: skip
+        waves = zip(amplitudes, frequencies, phases, strict=True)
+        return float(sum(a * np.sin(2.0 * np.pi * f * t + p) for a, f, p in waves))
 
     return value
 
@@ -84,7 +85,7 @@ def quarter_car(path: Path, seed: int, seconds: float = 12.0, friction: float = 
 
 
 def gearbox(path: Path, seed: int, seconds: float = 12.0, half_gap: float = 0.03) -> None:
-    """A motor and a flywheel whose teeth lose touch: free flight and a stiffening, lossy contact (Hunt and Crossley)."""
+    """A motor and a flywheel whose teeth lose touch: free flight, then a contact that stiffens and loses."""
     volts = sines(seed, (5.0, 4.0, 2.0), (0.5, 1.3, 2.9))
     n, kt, r, jm, jl, k, c, drag = 10.0, 0.0502, 2.01, 2.03e-5, 3.97e-3, 8.2, 0.02, 0.0102
 
