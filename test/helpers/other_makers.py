@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigs simulated by other means than the package's: scipy's adaptive integrator with events, laws that no library has."""
+"""Rigs simulated by other means than the package: an adaptive integrator with events, laws that no library has."""
 
 from __future__ import annotations
 
