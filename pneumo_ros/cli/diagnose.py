@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros.cli.app import App
+from pneumo_ros.cli.diagnose_against import check_against, fitted_half_car
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
@@ -70,6 +72,10 @@ def diagnose(
             "CSV, Parquet, .mat (docs/your-rig.md)."
         ),
     ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="An earlier log: it fits the rig, and FIT is diagnosed against that rig. What has changed?"),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
     overwrite: Overwrite = False,
     tables: Annotated[
@@ -93,13 +99,14 @@ def diagnose(
     if not fit or output is None:
         missing = "no log to fit" if not fit else "no folder for the diagnosis"
         raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
+    check_against(against)
     if rig_model is not None:
         from pneumo_ros.cli.diagnose_own import diagnose_own
 
         if edit is not None or effect:
             key, given = ("--effect", effect[0]) if effect else ("--edit", edit)
             raise InputError("is the half car's own", where=given, key=key, remedy="leave it away with --rig-model")
-        diagnose_own(console, rig_model, fit, holdout, output, rig, without or (), save_rig, pairs, overwrite)
+        diagnose_own(console, rig_model, fit, holdout, output, rig, without or (), save_rig, against, pairs, overwrite)
         return
     _check_files(fit, holdout, edit, rig, effect)
     refuse_old_diagnosis(output, save_rig, overwrite, [rig] if rig is not None else [])
@@ -118,7 +125,10 @@ def diagnose(
     own = None if rig is None else load_rig(rig)
     if own is not None:
         tell_assumed(console, own, rig)
-    task = prepared(fit, holdout, own, edit, effect or (), without or ())
+    with ExitStack() as held:
+        if against is not None:
+            own = held.enter_context(fitted_half_car(console, against, own, effect or (), pairs))
+        task = prepared(fit, holdout, own, edit, effect or (), without or ())
     options = Options(pairs=pairs, experiment=design_experiment, threads=os.cpu_count() or 1)
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)

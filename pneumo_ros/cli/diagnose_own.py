@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
+from pneumo_ros.cli.diagnose_against import fitted_own
 from pneumo_ros.cli.existing import refuse_old_diagnosis
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
@@ -21,6 +23,7 @@ def diagnose_own(
     rig: Path | None,
     without: Sequence[str],
     save_rig: Path | None,
+    against: Path | None,
     pairs: bool,
     overwrite: bool,
 ) -> None:
@@ -42,7 +45,10 @@ def diagnose_own(
     from pneumo_ros.own_rig.from_files import prepared
 
     claim_folder(output)
-    task = prepared(model, fit, holdout, rig, without)
+    with ExitStack() as held:
+        if against is not None:
+            rig = held.enter_context(fitted_own(console, against, model, rig, pairs))
+        task = prepared(model, fit, holdout, rig, without)
     threads = (os.cpu_count() or 1) if task.model.physics.kernel.compiled else 1
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
