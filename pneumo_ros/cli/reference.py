@@ -26,7 +26,7 @@ the rig checks it by hand. `pneumo effects ID` shows the same on the terminal.
 """
 FAMILIES_HEAD = """# What may be missing, by kind of slot
 
-Made from the registry (`pneumo_ros/slots/laws.py`, `pneumo_ros/slots/shapes.py`) by `make docs`: the families that a rig of
+Made from the registry (`pneumo_ros/slots/laws.py` and `shapes.py`) by `make docs`: the families that a rig of
 your own ([your-rig.md](your-rig.md)) may be diagnosed with. A family is a mechanism; its laws compete, its shape is a
 sum of simple atoms of one sign that any law of the kind lies in, and "whatever may act there" uses every atom of the
 slot with either sign: the ceiling that a name is measured against ([diagnosis.md](diagnosis.md)). Sizes are looked for

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -74,11 +74,22 @@ def _quoted(text: str) -> str:
 
 
 def _named_apart(found: list[Found]) -> Iterator[Found]:
-    """Short names where they are unlike, with their topic's before them where not."""
-    names = [one.name for one in found]
+    """Short names where they are unlike, with topic and field in them where not."""
+    names, used = [one.name for one in found], set[str]()
     for one in found:
-        long = re.sub(r"\W+", "_", f"{one.topic}_{one.name}").strip("_") if names.count(one.name) > 1 else one.name
-        yield Found(long, one.topic, one.field, one.unit, one.rate, one.low, one.high)
+        name = one.name
+        if names.count(name) > 1:
+            name = _word(f"{one.topic}_{one.name}")
+        if name in used:
+            name = _word(f"{one.topic}_{one.field}")
+        used.add(name)
+        yield replace(one, name=name)
+
+
+def _word(text: str) -> str:
+    """A name that Python can use."""
+    word = re.sub(r"\W+", "_", text).strip("_")
+    return f"column_{word}" if not word or word[0].isdigit() else word
 
 
 def _table(path: Path) -> Iterator[Found]:
@@ -120,6 +131,4 @@ def _found(topic: str, field: str, values: Array, unit: str, rate: float) -> Fou
     own = values[np.isfinite(values)]
     low, high = (float(own.min()), float(own.max())) if len(own) else (0.0, 0.0)
     bracket = re.search(r"\[([A-Za-z_]\w*)\]$", field)
-    name = re.sub(r"\W+", "_", bracket[1] if bracket else field).strip("_")
-    name = f"column_{name}" if not name or name[0].isdigit() else name
-    return Found(name, topic, field, unit, rate, low, high)
+    return Found(_word(bracket[1] if bracket else field), topic, field, unit, rate, low, high)

@@ -97,7 +97,7 @@ def passed(u: Array, period: float, P: Array, S: Array) -> Array:
     return np.asarray(out + shared)
 
 
-def undone(y: Array, P: Array, S: Array, rounds: int = 4) -> Array:
+def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:
     """What a sensor with these values alone was shown to read ``y``, by fixed point; ways that take time are left."""
     still = P.copy()
     still[[LAG, SECOND_LAG, DELAY, PLAY, CUT]] = 0.0
