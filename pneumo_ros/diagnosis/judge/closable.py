@@ -65,7 +65,7 @@ class EffectEvidence:
 
     @property
     def leaves(self) -> float:
-        """What its family leaves, rms, over what whatever may act at its places leaves; 1 where no model form is stated.
+        """What its family leaves, rms, over what anything at its places leaves; 1 where no model form is stated.
 
         :data:`SLACK` of what there was to close counts as nothing.
         """
