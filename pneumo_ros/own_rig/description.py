@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -252,9 +253,14 @@ def _effect(entry: Any, path: Path) -> Active:
                          allowed="{effect: ..., site: ..., values: [...]}") from error  # fmt: skip
 
 
+def usable_name(name: str) -> bool:
+    """Whether Python can call something that."""
+    return name.isidentifier() and not name.startswith("_") and not iskeyword(name)
+
+
 def _check_names(path: Path, *tables: Mapping[str, Any]) -> None:
     for table in tables:
         for name in table:
-            if not str(name).isidentifier() or str(name).startswith("_"):
+            if not usable_name(str(name)):
                 raise InputError("not a name that Python can use", where=path, key=str(name),
                                  allowed="letters, digits and _, as in rear_axle")  # fmt: skip

@@ -16,7 +16,7 @@ from typing import Any
 from numba import njit
 
 from pneumo_ros.errors import InputError, not_one_of
-from pneumo_ros.own_rig.description import Description
+from pneumo_ros.own_rig.description import Description, usable_name
 from pneumo_ros.own_rig.kernel import Kernel, Names, build, tried
 from pneumo_ros.slots.kinds import IN_EQUATIONS, Slot
 from pneumo_ros.slots.library import families_of
@@ -120,7 +120,7 @@ def _slots(module: ModuleType, path: Path, rig: Description) -> tuple[Slot, ...]
     for one in slots:
         if places.count(one.place) > 1:
             raise InputError("two slots of one name", where=path, key="SLOTS", value=one.name, remedy="name them apart")
-        if not one.name.isidentifier() or one.name.startswith("_"):
+        if not usable_name(one.name):
             raise InputError("not a name that Python can use", where=path, key="SLOTS", value=one.name,
                              allowed="letters, digits and _")  # fmt: skip
         known = rig.channels if one.kind == "sensor" else rig.inputs

@@ -107,7 +107,7 @@ def read_record(path: Path, rig: Description) -> OwnRecord:
     measured, weight = (np.column_stack([c[k] for c in columns]) for k in (0, 1))
     inputs = [_driven(base, held[name], spec.hold) for name, spec in rig.inputs.items()]
     period = float(base[1] - base[0])
-    noises = [_noise(spec, measured[:, k], weight[:, k], path) for k, spec in enumerate(rig.channels.values())]
+    noises = [_noise(spec, held[name].values, path) for name, spec in rig.channels.items()]
     noise, slow = (np.array([one[k] for one in noises]) for k in (0, 1))
     _check_moves(path, rig, measured, weight)
     whole = np.column_stack(inputs) if inputs else np.zeros((len(base), 0))
@@ -201,9 +201,9 @@ def _driven(base: Array, one: Sampled, hold: bool) -> Array:
     return np.asarray(one.values[np.clip(np.searchsorted(one.time, base, side="right") - 1, 0, len(one.time) - 1)])
 
 
-def _noise(spec: SignalSpec, values: Array, weight: Array, path: Path) -> tuple[float, float]:
+def _noise(spec: SignalSpec, values: Array, path: Path) -> tuple[float, float]:
     """Standard deviation of a channel's noise, and of the part of it that wanders."""
-    white = white_noise(values, weight)
+    white = white_noise(values, np.ones_like(values))
     found = white if spec.noise is None else spec.noise
     if not np.isfinite(found):
         raise InputError("the noise cannot be told from the data", where=path, key=spec.name,

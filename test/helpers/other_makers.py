@@ -84,7 +84,7 @@ def quarter_car(path: Path, seed: int, seconds: float = 12.0, friction: float = 
     np.savetxt(path, table, "%.7g", ",", header="t,body,wheel,road", comments="")
 
 
-def gearbox(path: Path, seed: int, seconds: float = 12.0, half_gap: float = 0.03) -> None:
+def gearbox(path: Path, seed: int, seconds: float = 12.0, half_gap: float = 0.1) -> None:
     """A motor and a flywheel whose teeth lose touch: free flight, then a contact that stiffens and loses."""
     volts = sines(seed, (5.0, 4.0, 2.0), (0.5, 1.3, 2.9))
     n, kt, r, jm, jl, k, c, drag = 10.0, 0.0502, 2.01, 2.03e-5, 3.97e-3, 8.2, 0.02, 0.0102
