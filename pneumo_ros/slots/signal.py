@@ -75,7 +75,12 @@ def _static(u: Array, P: Array, S: Array) -> Array:
 
 
 def passed(u: Array, period: float, P: Array, S: Array) -> Array:
-    """A signal (N,) after its way."""
+    """A signal (N,) after its way; not finite where a wild error is."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _passed(u, period, P, S)
+
+
+def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
     out = _static(u, P, S)
     if P[PLAY] != 0.0:
         out = _played(out, P[PLAY])
@@ -103,9 +108,10 @@ def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:
     still[[LAG, SECOND_LAG, DELAY, PLAY, CUT]] = 0.0
     still[PLAYS:VALUES] = 0.0
     true = y.copy()
-    for _ in range(rounds):
-        true = true - (_static(true, still, S) - y)
-    return np.asarray(true)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(rounds):
+            true = true - (_static(true, still, S) - y)
+    return np.where(np.isfinite(true), true, y)
 
 
 def scales_of(u: Array, period: float) -> Array:
