@@ -15,12 +15,14 @@ help:  ## Show this list
 
 $(READY): requirements.lock setup.py package.xml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input -r requirements.lock
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --no-deps --no-build-isolation --editable .
 	@touch $@
 
-demo: $(READY)  ## A 20 s closed-loop session on a class D road: log, summary, picture
-	$(BIN)/pneumo run --isolate --road D --duration 20
+SEED ?= 1
+
+demo: $(READY)  ## A rig with a hidden effect, two sessions, the diagnosis, the answer beside it (2 min; SEED=2 draws another)
+	$(BIN)/pneumo demo --seed $(SEED)
 
 test: lint types unit  ## Lint, types and every test
 
@@ -31,8 +33,11 @@ lint: $(READY)
 types: $(READY)
 	$(BIN)/mypy
 
+# Two processes share the files of tests; those of the clock have the computer to themselves afterwards.
+WORKERS ?= 2
 unit: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -m "not realtime" --numprocesses $(WORKERS) --dist loadscope --no-loadscope-reorder
+	$(BIN)/python -m pytest -m realtime
 
 # A second environment with what Ubuntu 24.04 packages, and PyPI's colcon: as near to a sourced Jazzy as wheels come.
 FLOORS := .venv-floors
@@ -75,7 +80,6 @@ SPEED := kernel composed control_step reading replay lockstep
 bench: $(READY)  ## Every speed, side by side with its limit
 	for name in $(SPEED); do echo "== $$name"; $(BIN)/python bench/$$name.py || exit 1; done
 
-WORKERS ?= 2
 BLIND ?= build/blind
 
 blind: $(READY)  ## The full blind check, 280 sealed cases (two hours on 2 cores); goes on where it was interrupted

@@ -72,7 +72,7 @@ setup(
         "parquet": ["pyarrow>=15"],
         "view": ["bokeh>=3.4,<4"],
         "test": TESTING,
-        "dev": [*TESTING, "ruff>=0.6", "mypy>=1.11", "types-PyYAML>=6"],
+        "dev": [*TESTING, "pytest-xdist>=3.7", "ruff>=0.6", "mypy>=1.11", "types-PyYAML>=6"],
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),

@@ -2,12 +2,15 @@
 """What signals do to a session: every signal to every process, simulated and on the emulated rig, one table.
 
 After each: no process is left, the log can be read, the valves of the emulated rig are safe, the session ended with an
-exit code and one sentence, without a traceback. Exits with 1 if any of that fails.
+exit code and one sentence, without a traceback. Exits with 1 if any of that fails. With ``--results FILE`` what is in
+that file already is not tried again.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
+import json
 import os
 import signal
 import subprocess
@@ -16,7 +19,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +131,7 @@ def trial(mode: str, target: str, kind: str, folder: Path) -> Outcome:
 def session(target: str, kind: str, folder: Path, options: list[str], rig: str) -> Outcome:
     """Start a session, send the signal when it is under way, wait for the end and look at what is left."""
     log = folder / "session.mcap"
-    view = ["--view"] if target == "dashboard" else []
+    view = ["--view"] if target in ("dashboard", "supervisor") else []  # what the supervisor leaves behind is all
     said = (folder / "said.txt").open("w+")
     process = subprocess.Popen(
         [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--isolate", "--no-picture", "--no-report", "--output",
@@ -178,8 +181,6 @@ def samples(folder: Path) -> int:
 def valves(record: Path) -> str:
     """Whether the emulated valves were safe at the end."""
     with np.load(record) as data:
-        import json
-
         states = [text for _, kind, text in json.loads(str(data["events"])) if kind == "valves"]
     return "yes" if not states or states[-1] == "safe" else f"NO: {states[-1]}"
 
@@ -190,21 +191,34 @@ def main() -> int:
     parser.add_argument("--modes", nargs="+", default=MODES, choices=MODES)
     parser.add_argument("--processes", nargs="+", default=PROCESSES, choices=PROCESSES)
     parser.add_argument("--signals", nargs="+", default=SIGNALS, choices=SIGNALS)
+    parser.add_argument("--results", type=Path, help="file of outcomes, a line each, that is read first and added to")
     arguments = parser.parse_args()
+    known = outcomes(arguments.results)
     wrong = rows = 0
     print(f"{'mode':9s} {'process':17s} {'signal':9s} {'good':5s} {'code':>4s} {'samples':>7s} {'safe':5s} sentence")
-    for mode in arguments.modes:
-        for target in arguments.processes:
-            for kind in arguments.signals:
-                with tempfile.TemporaryDirectory() as folder:
-                    found = trial(mode, target, kind, Path(folder))
-                rows, wrong = rows + 1, wrong + (not found.good)
-                shown = found.sentence + (f" [{found.orphans} left]" if found.orphans else "")
-                shown += " [traceback]" if found.traceback else ""
-                print(f"{mode:9s} {target:17s} {kind:9s} {'yes' if found.good else 'NO':5s} {found.code!s:>4s} "
-                      f"{found.samples:7d} {found.safe:5s} {shown[:150]}", flush=True)  # fmt: skip
+    for mode, target, kind in itertools.product(arguments.modes, arguments.processes, arguments.signals):
+        found = known.get((mode, target, kind))
+        if found is None:
+            with tempfile.TemporaryDirectory() as folder:
+                found = trial(mode, target, kind, Path(folder))
+            if arguments.results is not None:
+                with arguments.results.open("a") as stream:
+                    stream.write(json.dumps([mode, target, kind, asdict(found)]) + "\n")
+        rows, wrong = rows + 1, wrong + (not found.good)
+        shown = found.sentence + (f" [{found.orphans} left]" if found.orphans else "")
+        shown += " [traceback]" if found.traceback else ""
+        print(f"{mode:9s} {target:17s} {kind:9s} {'yes' if found.good else 'NO':5s} {found.code!s:>4s} "
+              f"{found.samples:7d} {found.safe:5s} {shown[:150]}", flush=True)  # fmt: skip
     print(f"{rows - wrong} of {rows} as they must be")
     return 1 if wrong else 0
+
+
+def outcomes(results: Path | None) -> dict[tuple[str, str, str], Outcome]:
+    """What an earlier run found, by mode, process and signal."""
+    if results is None or not results.exists():
+        return {}
+    rows = [json.loads(line) for line in results.read_text().splitlines()]
+    return {(mode, target, kind): Outcome(**found) for mode, target, kind, found in rows}
 
 
 if __name__ == "__main__":

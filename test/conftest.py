@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -34,10 +35,13 @@ def own_state(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Real-time tests get two more tries: a stall of a shared machine is not the code's; the bounds stay.
+    """Files with many slow tests come first, so that processes that share the files end together.
 
-    ROS distributes no package of the plugin that repeats them: without it they have one try.
+    Real-time tests get two more tries: a stall of a shared machine is not the code's; the bounds stay. ROS distributes
+    no package of the plugin that repeats them: without it they have one try.
     """
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: -slow[item.path])
     if not config.pluginmanager.hasplugin("rerunfailures"):
         return
     for item in items:

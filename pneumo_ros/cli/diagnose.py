@@ -21,10 +21,10 @@ from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
+    from pneumo_ros.diagnosis.report import Story
     from pneumo_ros.diagnosis.result import Diagnosis, EditTest
 
 app = App(add_completion=False)
-SHARE_SHOWN = 0.05
 SHOWN = 5  # rows of the ranking on the terminal; the file has all
 
 
@@ -114,7 +114,7 @@ def diagnose(
     from pneumo_ros.diagnosis.half_car.experiment import design_experiment
     from pneumo_ros.diagnosis.half_car.from_logs import prepared
     from pneumo_ros.diagnosis.half_car.saved_rig import save_corrected_rig
-    from pneumo_ros.diagnosis.report import claim_folder, write_outputs
+    from pneumo_ros.diagnosis.report import Asked, claim_folder, write_outputs
     from pneumo_ros.rig import load_rig
 
     claim_folder(output)
@@ -133,17 +133,21 @@ def diagnose(
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    files = write_outputs(output, found, task.model, task.fit, task.holdout)
+    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without))
+    files, first = write_outputs(output, found, task.model, task.fit, task.holdout, asked=asked)
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
         files.append(save_corrected_rig(found, task.model, save_rig))
-    phrases = {name: effect.summary for name, effect in task.model.library.items()}
-    show(console, found, found.to_json(), phrases, [log.name for log in task.fit])
-    if found.experiment is not None:
-        console.print(f"next experiment, {found.experiment.description}:", highlight=False, soft_wrap=True)
-        console.print(f"  {found.experiment.command(output)}", highlight=False, soft_wrap=True)
+    show(console, found, first)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+
+
+def _repeated(rig: Path | None, effects: Sequence[Path] | None, without: Sequence[str] | None) -> tuple[str, ...]:
+    """Options of this diagnosis that the next one needs as well."""
+    words = [("--rig", rig)] if rig is not None else []
+    words += [("--effect", path) for path in effects or ()]
+    return tuple(str(word) for pair in (*words, *(("--without", name) for name in without or ())) for word in pair)
 
 
 def _check_files(
@@ -160,31 +164,26 @@ def _check_files(
             raise InputError("no such file", where=file, key=key, remedy="check the name")
 
 
-def show(
-    console: Console, found: Diagnosis, summary: Mapping[str, Any], phrases: Mapping[str, str], fit: Sequence[str]
-) -> None:
-    """Verdict, how sure, where, how far; the head of the ranking; notes; what to do next."""
-    from pneumo_ros.diagnosis.report.words import confidence, headline, how_far, next_steps, place_words
+def show(console: Console, found: Diagnosis, first: Story) -> None:
+    """What the report says first; then the budget, the head of the ranking, the notes, and what to do next."""
+    from pneumo_ros.cli.tables import fact_table
 
-    console.print(f"[bold]{escape(headline(summary, phrases))}[/bold]", soft_wrap=True)
-    console.print(f"{found.verdict} ({confidence(summary)})", highlight=False)
-    told = found.verdict != "not_testable"
-    if told:
-        places = [f"{place_words(place)} {share:.0%}" for place, share in found.location if share >= SHARE_SHOWN]
-        console.print("where: " + (", ".join(places) or "no place stands out"), highlight=False)
-    rivals = [name for name in found.ambiguity_group if name != found.verdict]
-    if rivals and told:
-        console.print("not told apart by this log: " + ", ".join(rivals))
-    console.print(how_far(summary), highlight=False)
-    if told:
+    summary = found.to_json()
+    console.print(f"[bold]{escape(first.headline)}[/bold]", highlight=False)
+    console.print(f"{found.verdict} ({first.confidence})", highlight=False, markup=False)
+    if first.facts:
+        console.print(fact_table(first.facts))
+    if found.verdict != "not_testable":
         _show_budget(console, summary)
-        _show_ranking(console, found)
+        _show_ranking(console, summary)
     if found.edit is not None:
         _show_edit(console, found.edit)
     for note in found.notes:
         console.print(f"note: {note}", highlight=False, markup=False)
-    for step in next_steps(summary, fit):
-        console.print(f"next: {step}", highlight=False, markup=False)
+    for step in first.steps:
+        console.print(f"next: {step.text}", highlight=False, markup=False)
+        for line in step.commands:  # whole, so that it can be copied
+            console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
@@ -195,24 +194,25 @@ def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
     for row in budget_rows(summary):
         entry = row.get("entry", {})
         probability = f"{entry['probability']:.2f}" if entry else ""
-        rows.append((row["words"], f"{row['share']:.1%}", entry.get("law", ""), probability))
+        law = {"": "", "differs": "another than the library's"}.get(str(entry.get("law", "")), "the library's")
+        rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
     console.print(simple_table(("of the gap", "share", "law", "probability"), rows))
 
 
-def _show_ranking(console: Console, found: Diagnosis) -> None:
+def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
     from pneumo_ros.cli.tables import simple_table
+    from pneumo_ros.diagnosis.report.words import structure_words
 
     rows = [
         (
-            " + ".join(f"{e} ({s})" if s else e for e, s in zip(r.effects, r.sites, strict=False)) or r.effects[0],
-            f"{r.probability:.2f}",
-            f"{r.gap_after:.3g}",
-            f"{r.shrink:.1%}",
-            f"{r.shrink_ci90[0]:.1%} ... {r.shrink_ci90[1]:.1%}",
+            structure_words(entry),
+            f"{entry['probability']:.2f}",
+            f"{entry['gap_after']:.3g}",
+            f"{100 * entry['shrink']:.1f} %",
         )
-        for r in found.ranking[:SHOWN]
+        for entry in summary["ranking"][:SHOWN]
     ]
-    console.print(simple_table(("structure", "probability", "gap left", "closed", "90 % interval"), rows))
+    console.print(simple_table(("what competed", "probability", "gap left", "closed"), rows))
 
 
 def _show_edit(console: Console, edit: EditTest) -> None:

@@ -40,11 +40,12 @@ def diagnose_own(
     refuse_old_diagnosis(output, save_rig, overwrite, [rig_file_of(model, rig)])
     from pneumo_ros.cli.diagnose import progress_bar, show
     from pneumo_ros.diagnosis.diagnose import Options
-    from pneumo_ros.diagnosis.report import claim_folder
+    from pneumo_ros.diagnosis.report import Asked, claim_folder
     from pneumo_ros.own_rig import outputs
     from pneumo_ros.own_rig.from_files import prepared
 
     claim_folder(output)
+    rig_asked = rig
     with ExitStack() as held:
         if against is not None:
             rig = held.enter_context(fitted_own(console, against, model, rig, pairs))
@@ -54,10 +55,12 @@ def diagnose_own(
         bar = progress.add_task("diagnosing", total=1.0)
         options = Options(pairs=pairs, threads=threads)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    files = outputs.write_outputs(output, found, task.model, task.fit, task.holdout)
+    named = ("--rig-model", str(model), *(() if rig_asked is None else ("--rig", str(rig_asked))))
+    asked = Asked(tuple(fit), holdout, output, save_rig, named)
+    files, first = outputs.write_outputs(output, found, task.model, task.fit, task.holdout, asked)
     if save_rig is not None:
         files.append(outputs.save_rig(found, task.model, save_rig))
-    show(console, found, outputs.summary_of(found), outputs.phrases_of(task.model), [log.name for log in task.fit])
+    show(console, found, first)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
 
 

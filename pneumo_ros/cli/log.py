@@ -34,6 +34,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existin
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 _EVENTS_SHOWN = 40
+ROUNDING = 1e-12  # of mm, kPa, mm2 ...: what adding up leaves of nothing
 _WIDE = 130  # columns from which the types are shown as well
 _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
 _COLOUR = {"ok": "green", "note": "cyan", "warning": "yellow", "error": "red"}
@@ -357,7 +358,10 @@ def _signals_table(result: Comparison) -> Table:
 
 
 def _number(value: float) -> str:
-    return f"{value:.3g}".replace("e+0", "e").replace("e-0", "e-") if math.isfinite(value) else "-"
+    if abs(value) < ROUNDING:
+        value = 0.0
+    short = f"{value:.3g}" if abs(value) >= 1e-2 or not value else f"{value:.2g}"
+    return short.replace("e+0", "e").replace("e-0", "e-") if math.isfinite(value) else "-"
 
 
 if __name__ == "__main__":

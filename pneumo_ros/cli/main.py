@@ -36,6 +36,7 @@ from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
+    "demo": "See it work: hide an effect in the rig, drive it, diagnose the logs, open the answer.",
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
     "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",

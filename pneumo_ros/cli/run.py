@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from rich.markup import escape
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pneumo_ros.rig import Rig
     from pneumo_ros.session.claim import Claim
     from pneumo_ros.session.plan import Tables, Values
+    from pneumo_ros.session.summary import Recorded
     from pneumo_ros.session.supervisor import Place
 
 app = App(add_completion=False)
@@ -94,6 +95,7 @@ def run(
     ] = False,
     report: Annotated[bool, typer.Option(help="Write an HTML page beside the log.")] = True,
     picture: Annotated[bool, typer.Option(help="Write a PNG beside the log.")] = True,
+    summary: Annotated[bool, typer.Option(help="Print how the ride was, beside passive valves.")] = True,
 ) -> None:
     """Run a session: simulate the rig in closed loop and log it."""
     check_road(road)
@@ -141,7 +143,7 @@ def run(
         with beside(claim.domain, place) if view else nullcontext() as dashboard:
             there = Place(claim.domain, place, (claim.descriptor,))
             _run_session(console, values, target, single_process, there, verbose)
-            _report_unless_asked_to_end(console, target, values, picture, report)
+            _report_unless_asked_to_end(console, target, values, Wanted(summary, picture, report))
             if dashboard is not None:
                 console.print("the dashboard stays until Ctrl-C")
                 dashboard.wait()
@@ -258,16 +260,10 @@ def _tell_effects(console: Console, rig: Rig, source: str) -> None:
 
 def _check(values: Values, target: Path) -> Rig:
     """Find every mistake before a process starts: rig, trim, effects, road and output file."""
-    from pneumo_ros.plant.trim import trim
-    from pneumo_ros.rig import load_rig
     from pneumo_ros.road import PARAMETERS, build_road
 
-    rig = load_rig(str(values["road_profile"].get("rig", "")) or None)
-    trim(rig)
-    if rig.effects:
-        from pneumo_ros.effects.configured import library_of, standing_effects
-
-        standing_effects(rig, library_of(rig))
+    rig = _standing_rig(str(values["road_profile"].get("rig", "")))
+    _standing_rig(str(values.get("plant", {}).get("simulated_rig", "")))
     _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="road")
@@ -275,6 +271,20 @@ def _check(values: Values, target: Path) -> Rig:
         raise InputError("a log's name must end in .mcap", where=target, remedy="choose another name")
     if target.exists():
         raise InputError("the log exists already", where=target, remedy="choose another name or move it away")
+    return rig
+
+
+def _standing_rig(file: str) -> Rig:
+    """A rig that stands at its trim, with effects that the library has; '' is the nominal one."""
+    from pneumo_ros.plant.trim import trim
+    from pneumo_ros.rig import load_rig
+
+    rig = load_rig(file or None)
+    trim(rig)
+    if rig.effects:
+        from pneumo_ros.effects.configured import library_of, standing_effects
+
+        standing_effects(rig, library_of(rig))
     return rig
 
 
@@ -390,12 +400,20 @@ def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None
     console.print(f"stopped by {by}; the log is finished")
 
 
-def _report_unless_asked_to_end(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+class Wanted(NamedTuple):
+    """What is made of a finished session."""
+
+    summary: bool
+    picture: bool
+    page: bool
+
+
+def _report_unless_asked_to_end(console: Console, target: Path, values: Values, wanted: Wanted) -> None:
     """The session and its log are done; who asks again to end gets no report."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        _report(console, target, values, picture, page)
+        _report(console, target, values, wanted)
     except KeyboardInterrupt:
         console.print(f"no report was made; log {target}")
         raise typer.Exit from None
@@ -420,38 +438,48 @@ def _save_what_is_left(target: Path) -> None:
     out.print(f"recovered {found.kept} messages: {found.output}")
 
 
-def _report(console: Console, target: Path, values: Values, picture: bool, page: bool) -> None:
+def _report(console: Console, target: Path, values: Values, wanted: Wanted) -> None:
     """Table of the active run beside passive valves on the same road, the picture and the page."""
     from pneumo_ros.cli.passive import passive_run
-    from pneumo_ros.cli.tables import summary_table, timing_table
     from pneumo_ros.log.reading import read_log
     from pneumo_ros.rig import load_rig
-    from pneumo_ros.session.summary import load_session, loop_timing, summarise, wall_time
-    from pneumo_ros.session.warnings import warnings_of
+    from pneumo_ros.session.summary import load_session
 
+    if not any(wanted):
+        console.print(f"log      {target}", soft_wrap=True)
+        return
     session = load_session(target)
-    own = load_rig(str(values["road_profile"].get("rig", "")) or None)
-    other = passive_run(session, own)
-    loop = loop_timing(target)
-    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
-    theirs = summarise(other) if other is not None else None
-    console.print(summary_table(ours, theirs))
-    console.print(timing_table(ours))
-    for line in ours.warnings:
-        console.print(f"[yellow]warning[/]  {line}", highlight=False, soft_wrap=True)
-    console.print(f"log      {target}")
-    if picture:
+    other = passive_run(session, load_rig(str(values["road_profile"].get("rig", "")) or None))
+    if wanted.summary:
+        _summarise(console, target, session, other)
+    console.print(f"log      {target}", soft_wrap=True)
+    if wanted.picture:
         from pneumo_ros.session.picture import draw_session
 
         png = target.with_suffix(".png")
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
-        console.print(f"picture  {png}")
-    if page:
+        console.print(f"picture  {png}", soft_wrap=True)
+    if wanted.page:
         from pneumo_ros.session.report import write_report
 
         html = target.with_suffix(".html")
         write_report(read_log(target), html, other)
-        console.print(f"report   {html}")
+        console.print(f"report   {html}", soft_wrap=True)
+
+
+def _summarise(console: Console, target: Path, session: Recorded, other: Recorded | None) -> None:
+    """Tables of ride and loops, and what a reader must be warned of."""
+    from pneumo_ros.cli.tables import summary_table, timing_table
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.session.summary import loop_timing, summarise, wall_time
+    from pneumo_ros.session.warnings import warnings_of
+
+    loop = loop_timing(target)
+    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
+    console.print(summary_table(ours, summarise(other) if other is not None else None))
+    console.print(timing_table(ours))
+    for line in ours.warnings:
+        console.print(f"[yellow]warning[/]  {line}", highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

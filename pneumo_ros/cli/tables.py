@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 from pneumo_ros.session.summary import change, figures, pace, ride_rows
 from pneumo_ros.units import SQUARE_INCH
@@ -20,7 +21,8 @@ PERCENTILES = ("p50", "p99", "max")
 
 def summary_table(active: Summary, passive: Summary | None) -> Table:
     """Ride, valves and estimates of a session beside passive valves on the same road."""
-    table = Table(title="After the first second", title_justify="left", box=box.SIMPLE)
+    table = Table(title="After the first second", title_justify="left", box=box.SIMPLE, show_edge=False, pad_edge=False,
+                  padding=(0, 1, 0, 0))  # fmt: skip
     table.add_column("f / r: front / rear", no_wrap=True)
     for column in ("session", "passive", "change") if passive is not None else ("session",):
         table.add_column(column, justify="right", no_wrap=True)
@@ -70,6 +72,16 @@ def plain_table(columns: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Ta
         table.add_column(column, no_wrap=number == 0)
     for row in rows:
         table.add_row(*row)
+    return table
+
+
+def fact_table(facts: Sequence[tuple[str, str]]) -> Table:
+    """What is told, and its text, which may break over lines."""
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 2), pad_edge=True)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name, text in facts:
+        table.add_row(name, Text(text))
     return table
 
 

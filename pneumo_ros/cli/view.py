@@ -83,7 +83,9 @@ def view_live(host: str, port: int, token: str | None, domain_id: int | None, na
     from pneumo_ros.dashboard.page import Page
     from pneumo_ros.dashboard.server import serve
     from pneumo_ros.nodes.dashboard_link import LiveLink
+    from pneumo_ros.nodes.spin import end_with_supervisor
 
+    end_with_supervisor()
     os.nice(NICE)
     with LiveLink(domain_id, namespace) as link:
         dashboard = serve(lambda document: _keep(Page(document, link, link)), host, port, token)
@@ -93,11 +95,16 @@ def view_live(host: str, port: int, token: str | None, domain_id: int | None, na
 
 @contextmanager
 def beside(domain_id: int | None, namespace: str = "") -> Iterator[Viewer]:
-    """The live dashboard in a process of its own, so that drawing never holds up a node; ended on leaving."""
+    """The live dashboard in a process of its own, so that drawing never holds up a node; ended on leaving.
+
+    Who kills this process ends the dashboard as well: nobody would know its address any more.
+    """
     _need_bokeh()
+    from pneumo_ros.session.supervisor import SUPERVISOR
+
     domain = ["--domain-id", str(domain_id)] if domain_id is not None else []
     domain += ["--namespace", namespace] if namespace else []
-    environment = {**os.environ}
+    environment = {**os.environ, SUPERVISOR: str(os.getpid())}
     environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     process = subprocess.Popen(
         [sys.executable, "-m", "pneumo_ros.cli.view", *domain], env=environment, start_new_session=True

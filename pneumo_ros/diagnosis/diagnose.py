@@ -192,6 +192,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
     if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
         tell(0.97, "designing the next experiment")
         experiment = _next_experiment(outcome, opinion, group, options.experiment)
+    refused = () if experiment is None or experiment.tells else (experiment.refusal,)
     cov = covariance(problem, best)
     shares = budgeted(outcome, opinion, cov)
     tell(1.0, "done")
@@ -211,9 +212,9 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         remainder=shares.remainder,
         floor_share=shares.floor,
         not_testable=hidden,
-        experiment=experiment,
+        experiment=None if refused else experiment,
         edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
-        notes=tuple(_notes(contest, best, problem)),
+        notes=(*_notes(contest, best, problem), *refused),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
         tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
         evidence=_evidence(outcome),

@@ -16,6 +16,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
+SEPARATES = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart
 ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
 
 
@@ -184,6 +185,19 @@ class Experiment:
     time: Array  # (N,) s
     road: Array  # (N, 2) m
     valves: Array  # (N, 4) m2
+    chosen_from: int = 1  # profiles that were tried
+
+    @property
+    def tells(self) -> bool:
+        """Whether it is worth playing: below :data:`SEPARATES` it would cost an hour and tell nothing."""
+        return self.separation >= SEPARATES
+
+    @property
+    def refusal(self) -> str:
+        """Why it is not offered, for people."""
+        return (f"no experiment is offered: of {self.chosen_from} road and valve profiles the best, {self.name}, would "
+                f"drive the rivals {self.separation:.2g} standard deviations of the noise apart, and {SEPARATES:g} are "
+                "needed; the check by hand tells them apart")  # fmt: skip
 
     def write(self, folder: Path) -> list[Path]:
         """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""

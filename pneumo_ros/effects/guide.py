@@ -13,7 +13,7 @@ _DISPLAYED = {  # SI unit -> factor and unit that people read
     "m3": (1e6, "cm3"),
     "s": (1e3, "ms"),
     "Pa": (1e-3, "kPa"),
-    "Pa s/kg": (1e-8, "kPa s/g"),
+    "Pa s/kg": (1e-6, "kPa s/g"),
     "1": (1e2, "%"),
     "1/m": (1.0, "/m"),
     "s/m": (1.0, "s/m"),

@@ -88,6 +88,12 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     return effects
 
 
+def own_ids(effects: Mapping[str, Effect]) -> list[str]:
+    """Effects that are not the package's own: a reader must know who competed, and what became of them."""
+    folder = Path(str(library.__file__)).parent
+    return [name for name in effects if is_law(name) and not (folder / f"{name}.py").exists()]
+
+
 def laws_of(effects: Mapping[str, Effect]) -> dict[str, Effect]:
     """What a verdict may name: the library without the shapes of families and of places."""
     return {name: effect for name, effect in effects.items() if is_law(name)}

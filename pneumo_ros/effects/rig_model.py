@@ -261,7 +261,8 @@ class RigModel:
         inputs = self.driven(inputs, record.period, active)[0]
         start = self.initial(record, active)[0] if initial is None else initial
         plant = self.plant(nuisance, active)
-        steps = 1 if FIT_STEP <= self.step < record.period <= COARSEST else substeps(record.period, self.step)
+        whole = self.step >= FIT_STEP and substeps(record.period, COARSEST) == 1
+        steps = 1 if whole else substeps(record.period, self.step)
         commands, road = np.ascontiguousarray(inputs.commands), np.ascontiguousarray(inputs.road)
         terms = self.terms(active)
         if not terms and correction is None:

@@ -18,6 +18,8 @@ from pneumo_ros.log.topics import BY_NAME, ROAD, Topic
 _KEYS = ("log_time_ns", "stamp_ns")
 ROAD_STEP, MIN_ROAD = 2e-3, 100  # s and samples of a road that is compared
 SAME_ROAD = 0.95  # correlation
+# What every session has of its own, or says a second time: it differs in every log and tells nothing about the run.
+OWN = ("session_id", "session", "output", "parameters")
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,9 @@ def _settings(first: Log, second: Log) -> Iterator[Difference]:
     for node in sorted({*ours, *theirs}):
         yield from _differences(node, ours.get(node, {}), theirs.get(node, {}))
     metadata = [{f"{m.name}.{k}": v for m in log.metadata for k, v in m.metadata.items()} for log in (first, second)]
-    for bulk in metadata:  # rosbag2's own description differs in every file and says nothing about the run
-        bulk.pop("rosbag2.serialized_metadata", None)
+    for bulk in metadata:
+        for name in ("rosbag2.serialized_metadata", *(f"pneumo_ros.{key}" for key in OWN)):
+            bulk.pop(name, None)
     yield from _differences("metadata", *metadata)
 
 
@@ -157,7 +160,7 @@ def _rig(log: Log) -> dict[str, Any]:
 
 def _differences(where: str, first: dict[str, Any], second: dict[str, Any]) -> Iterator[Difference]:
     for key in dict.fromkeys([*first, *second]):
-        if first.get(key) != second.get(key):
+        if key not in OWN and first.get(key) != second.get(key):
             yield Difference(where, key, first.get(key), second.get(key))
 
 

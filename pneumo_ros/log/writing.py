@@ -68,6 +68,14 @@ class Written:
     reason: str = ""
 
 
+class _Written(yaml.SafeDumper):
+    """YAML that says everything where it belongs: our own reader refuses aliases."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """A value that occurs twice is written twice."""
+        return True
+
+
 class LogWriter:
     """A session log being written.
 
@@ -128,7 +136,7 @@ class LogWriter:
         """Register a topic before its first message.
 
         ``qos`` as the publisher offers it, rosbag2's keys; ``step_ns`` for messages with a header whose stamps must
-        rise: by exactly so much, or by any amount if 0 (:attr:`disorder`).
+        rise: by exactly so much, or by any amount if 0 (:attr:`disorder`). What repeats or goes back is not written.
         """
         definition, type_hash = interface(type_name)
         with self._lock:
@@ -186,9 +194,9 @@ class LogWriter:
             reason or self._stopped,
         )
         description = self._bag_description(result)
-        text = yaml.safe_dump(description, sort_keys=False)
+        text = yaml.dump(description, Dumper=_Written, sort_keys=False)
         end = {"complete": str(result.complete).lower(), "reason": result.reason}
-        own = yaml.safe_dump(description["rosbag2_bagfile_information"], sort_keys=False)
+        own = yaml.dump(description["rosbag2_bagfile_information"], Dumper=_Written, sort_keys=False)
         self._attempt(lambda: self._writer.add_metadata("session", end))
         self._attempt(lambda: self._writer.add_metadata("rosbag2", {"serialized_metadata": own}))
         if self._attempt(self._writer.finish):  # a file without its end keeps the name of an unfinished one
@@ -240,8 +248,8 @@ class LogWriter:
                 elif log_ns == AT_LATEST:
                     log_ns = self._latest
                 self._latest = log_ns
-                if channel.number in self._steps:
-                    self._watch_stamps(channel, stamp_of(data))
+                if channel.number in self._steps and not self._in_order(channel, stamp_of(data)):
+                    continue
                 if self._total % DISK_CHECK_EVERY == 1:
                     self._check_disk()
                 if self._stopped:
@@ -252,13 +260,19 @@ class LogWriter:
                     self._stopped = f"the file system refused to write ({error})"
                     self._reserve.unlink(missing_ok=True)
 
-    def _watch_stamps(self, channel: Channel, stamp: int) -> None:
+    def _in_order(self, channel: Channel, stamp: int) -> bool:
+        """Whether a message is later than the one before it; one that is not has another sender, and is not written.
+
+        After a gap the log goes on: what was lost is no reason to lose the rest.
+        """
         last, step = self._stamps.get(channel.number), self._steps[channel.number]
-        self._stamps[channel.number] = stamp
-        if last is None or (stamp == last + step if step else stamp > last) or self._disorder:
-            return
-        what = "repeats" if stamp == last else "goes back" if stamp < last else "leaves a gap"
-        self._disorder = f"the stamp of {channel.topic} {what}: {stamp} ns after {last} ns"
+        later = last is None or stamp > last
+        if later:
+            self._stamps[channel.number] = stamp
+        if not self._disorder and last is not None and (stamp != last + step if step else not later):
+            what = "leaves a gap" if later else "repeats" if stamp == last else "goes back"
+            self._disorder = f"the stamp of {channel.topic} {what}: {stamp} ns after {last} ns"
+        return later
 
     def _check_disk(self) -> None:
         try:

@@ -32,6 +32,13 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("seed", 1, "1", "seed of the sensor noise", 0, 2**31 - 1, read_only=True),
     Parameter("truth_every", 5, "1", "publish /sim/truth every so many periods", 1, 1000, read_only=True),
     Parameter("clock_every", 5, "1", "publish /clock every so many periods (lockstep)", 1, 10, read_only=True),
+    Parameter(
+        "simulated_rig",
+        "",
+        "",
+        "rig file that is simulated where it is not the one that the session states and believes; empty: `rig`",
+        read_only=True,
+    ),
     Parameter("report_progress", False, "", "print the simulated time on standard output", read_only=True),
 )
 
@@ -42,7 +49,8 @@ class PlantNode(RigNode):
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         super().__init__("plant", PARAMETERS, context=context, overrides=overrides, owns_time=True)
         self.rig = load_rig(self.values["rig"] or None)
-        self.stepped = stepped_rig(self.rig, self.period_ns / SECOND)
+        real = load_rig(self.values["simulated_rig"]) if self.values["simulated_rig"] else self.rig
+        self.stepped = stepped_rig(real, self.period_ns / SECOND)
         self.state, self.command = self.stepped.init(), trim(self.rig).command
         self.noise = NoiseSource(self.rig, self.values["seed"])
         self.last = round(self.values["duration"] * self.values["rate_hz"])

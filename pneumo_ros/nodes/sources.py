@@ -19,7 +19,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from pneumo_ros.log.topics import Topic
 
 NAMELESS = "a node without a name yet"
-NAMING = 0.3  # s a node may take to announce its name after its publisher
+NAMING = 2.0  # s a node may take to announce its name after its publisher; on an idle computer it takes 10 ms
 UNKNOWN = "_UNKNOWN_"  # part of rmw's name of a node that has announced its publisher but not yet itself
 
 
@@ -81,7 +81,7 @@ class SoleSource:
             nodes = ", ".join(self._label(gid, node) for gid, node in self.publishers().items())
             if NAMELESS not in nodes or time.monotonic() >= end:
                 return f"{self.count} nodes publish {self._name()}: {nodes}"
-            time.sleep(NAMING / 20)
+            time.sleep(NAMING / 100)
 
     def _on_matched(self, change: Any) -> None:
         there = self.publishers()

@@ -57,10 +57,12 @@ def ask_no_more() -> None:
 
 
 def end_with_supervisor() -> None:
-    """Be sent SIGTERM at once when the supervisor's process ends, however it ends."""
+    """Be sent SIGTERM at once when the supervisor's process ends, however it ends; also if it has ended already."""
     supervisor = os.environ.get(SUPERVISOR)
     if supervisor:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != int(supervisor):
+            os.kill(os.getpid(), signal.SIGTERM)
 
 
 def make_executor(kind: str, context: Context | None) -> Executor:

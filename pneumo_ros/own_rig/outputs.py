@@ -11,10 +11,15 @@ import numpy as np
 import yaml
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.report.contents import Findings, RigCard, readable
+from pneumo_ros.diagnosis.report.card import RigCard
+from pneumo_ros.diagnosis.report.contents import Findings, told
 from pneumo_ros.diagnosis.report.outputs import FILES, claim_folder
 from pneumo_ros.diagnosis.report.page import write_report
+from pneumo_ros.diagnosis.report.quantities import readable
+from pneumo_ros.diagnosis.report.steps import Asked
+from pneumo_ros.diagnosis.report.story import Story
 from pneumo_ros.diagnosis.result import Diagnosis, write_json
+from pneumo_ros.effects.parameters import is_law
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.log.cdr import JointEncoder
@@ -34,15 +39,19 @@ def summary_of(found: Diagnosis) -> dict[str, Any]:
     return {**found.to_json(), "rig_model": True}
 
 
-def phrases_of(model: OwnRig) -> dict[str, str]:
-    """Effect id -> what it is, in words."""
-    return {name: effect.summary for name, effect in model.library.items()}
-
-
 def write_outputs(
-    folder: Path, found: Diagnosis, model: OwnRig, fit: Sequence[OwnRecord], holdout: OwnRecord
-) -> list[Path]:
+    folder: Path,
+    found: Diagnosis,
+    model: OwnRig,
+    fit: Sequence[OwnRecord],
+    holdout: OwnRecord,
+    asked: Asked | None = None,
+) -> tuple[list[Path], Story]:
     """Write report.html, residual.mcap and, last, diagnosis.json; older ones of the same names are replaced.
+
+    Returns
+    -------
+    The files, and what the report says first.
 
     Raises
     ------
@@ -51,12 +60,20 @@ def write_outputs(
     """
     claim_folder(folder)
     runs = {name: run for name, run in found.trajectories.items() if name in PREFIXES}
-    findings = Findings(summary_of(found), runs, holdout, [r.name for r in fit], card_of(model, holdout),
-                        phrases_of(model))  # fmt: skip
+    findings = Findings(
+        summary=summary_of(found),
+        trajectories=runs,
+        holdout=holdout,
+        fit_names=[record.name for record in fit],
+        library={name: effect for name, effect in model.library.items() if is_law(name)},
+        priors={p.name: (p.nominal, p.std) for p in model.parameters},
+        asked=asked,
+        card=card_of(model, holdout),
+    )
     write_report(folder / FILES[1], findings)
     write_residuals(folder / FILES[2], model, holdout, runs)
     write_json(found, folder / FILES[0])
-    return [folder / name for name in FILES]
+    return [folder / name for name in FILES], told(findings)
 
 
 def card_of(model: OwnRig, record: OwnRecord) -> RigCard:
@@ -65,7 +82,7 @@ def card_of(model: OwnRig, record: OwnRecord) -> RigCard:
     units = {}
     for k, (name, spec) in enumerate(model.description.channels.items()):
         units[name] = readable(UNITS[spec.unit][2], record.measured[:, k])
-    return RigCard(model.description.name, titles, units, picture_of(model.physics.slots))
+    return RigCard(titles, units, picture_of(model.physics.slots), model.description.name)
 
 
 def write_residuals(path: Path, model: OwnRig, holdout: OwnRecord, runs: Mapping[str, Array]) -> None:

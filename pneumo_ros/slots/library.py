@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import ANYTHING, SHAPE, Derived, EffectParameter, family_of
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
 from pneumo_ros.slots.kinds import Slot
@@ -31,6 +32,7 @@ class SlotEffect:
     by_site: Mapping[str, tuple[EffectParameter, ...]]
     columns: Mapping[str, tuple[int, ...]]
     derived: tuple[Derived, ...] = field(default=())
+    guide: Guide | None = None
 
     @property
     def parameters(self) -> tuple[EffectParameter, ...]:

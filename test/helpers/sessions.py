@@ -3,20 +3,52 @@
 
 from __future__ import annotations
 
+import fcntl
 import itertools
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from pathlib import Path
 
+from pneumo_ros.session.claim import runtime_folder
+
+DOMAINS = 100  # 1 to 100; higher ones reach the ephemeral ports
+HELD = 20  # locks a process keeps: a test needs three at most, and what it started is long over 20 domains later
 _next = itertools.count()
+_locks: deque[int] = deque()
 
 
 def own_domain() -> int:
-    """A domain id no other test of this process uses, 1 to 100 (higher ones reach the ephemeral ports)."""
-    return 1 + (os.getpid() * 13 + next(_next) * 7) % 100
+    """A domain id that no other test of this computer uses, whatever process it runs in, and no session has claimed."""
+    for k in itertools.islice(_next, DOMAINS):
+        domain = 1 + (os.getpid() * 13 + k * 7) % DOMAINS
+        lock = _locked(runtime_folder() / f"test-{domain}.lock")
+        if lock is None:
+            continue
+        session = _locked(runtime_folder() / f"domain-{domain}.lock")
+        if session is None:
+            os.close(lock)
+            continue
+        os.close(session)
+        _locks.append(lock)
+        if len(_locks) > HELD:
+            os.close(_locks.popleft())
+        return domain
+    raise AssertionError("tests or sessions have every domain of this computer")
+
+
+def _locked(path: Path) -> int | None:
+    """Descriptor of a file that nobody else has locked; the lock ends with it."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        return None
+    return descriptor
 
 
 def start(*options: str, domain: int | None = None) -> subprocess.Popen[str]:

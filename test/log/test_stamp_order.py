@@ -33,6 +33,7 @@ def test_disorder(tmp_path: Path, step: int | None, stamps: list[int], word: str
     encode = JointEncoder(COMMAND.frame_id, COMMAND.names).encode
     for stamp in stamps:
         writer.write(channel, encode(START + stamp, [0.0] * 4))
-    assert writer.finish().counts[COMMAND.name] == len(stamps), "what was sent is in the log all the same"
+    back = word in ("repeats", "goes back")
+    assert writer.finish().counts[COMMAND.name] == len(stamps) - back, "what goes back is somebody else's"
     assert word in writer.disorder and bool(word) == bool(writer.disorder)
     assert not word or COMMAND.name in writer.disorder

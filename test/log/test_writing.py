@@ -15,6 +15,7 @@ from rosbags.highlevel import AnyReader
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
+from pneumo_ros.log.bags import files_of
 from pneumo_ros.log.cdr import JointEncoder
 from pneumo_ros.log.chunks import ChunkedWriter
 from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, CHUNK_BYTES, FREE_BYTES_NEEDED, LogWriter
@@ -91,6 +92,7 @@ def test_log_times_sequence_and_bag_metadata(tmp_path: Path) -> None:
     with AnyReader([tmp_path]) as bag:
         times = [(c.topic, t) for c, t, _ in bag.messages()]
     assert sorted(times) == [("/note", 10**9 + 4), *((topics.ROAD.name, 10**9 + i) for i in range(5))]
+    assert files_of(tmp_path) == [tmp_path / "a.mcap"], "our own reader takes the folder too"
 
 
 def test_a_log_among_others_leaves_the_folder_alone(tmp_path: Path) -> None:

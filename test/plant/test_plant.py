@@ -21,7 +21,7 @@ from pneumo_ros.plant.air_spring import (
     spring_volume,
     volume_at_pressure,
 )
-from pneumo_ros.plant.half_car import DEFAULT_STEP, HalfCar, half_car
+from pneumo_ros.plant.half_car import DEFAULT_STEP, HalfCar, half_car, substeps
 from pneumo_ros.plant.orifice import critical_ratio, flow_function, mass_flow
 from pneumo_ros.plant.trim import Trim, nominal_half_car
 from pneumo_ros.rig import load_rig
@@ -69,6 +69,11 @@ def test_trajectory_meets_the_check_values(car_and_trim: tuple[HalfCar, Trim]) -
     commands = np.column_stack([rows[:-1, 1:3], np.tile(trim.outlets, (len(rows) - 1, 1))])
     ours = car.simulate(rows[0, 5:], commands, rows[:, 3:5], 1e-3)
     assert np.max(np.abs(ours - rows[:, 5:]).max(axis=0) / rows[:, 5:].std(axis=0)) < 1e-4
+
+
+def test_a_slow_clock_takes_no_second_step() -> None:
+    """A crystal off by 100 ppm stretches the period of a log, and a second step would double the time of every run."""
+    assert [substeps(period, 2e-3) for period in (1e-3, 2e-3, 2.0002e-3, 4.0004e-3, 2.1e-3)] == [1, 1, 1, 2, 2]
 
 
 def test_rest_is_an_equilibrium(car_and_trim: tuple[HalfCar, Trim]) -> None:

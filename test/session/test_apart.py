@@ -119,6 +119,7 @@ def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_us
     same_as_alone(alone, log, whole=False)
 
 
+@pytest.mark.realtime  # half a second for discovery
 def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_path: Path) -> None:
     domain = sessions.own_domain()
     with intruder(domain, "/rig1/rig/displacement"):

@@ -70,6 +70,15 @@ def test_the_table_of_hardware_says_what_it_is_from(hardware: Recorded, width: i
     assert "full scale (x 5)" in text
 
 
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_table_beside_passive_valves_is_whole(simulated: Recorded, width: int) -> None:
+    """Both ratings have left their scale: the widest row there is."""
+    ours = summarise(simulated)
+    assert ours.ride is not None and not ours.ride.rated
+    text = said(summary_table(ours, ours), width)
+    assert "…" not in text and text.count("out of its range") == 2 and max(map(len, text.splitlines())) <= width
+
+
 def test_hardware_is_held_against_passive_valves_and_drawn(hardware: Recorded, tmp_path: Path) -> None:
     other = passive_run(hardware)
     assert other is not None and len(other.truth) > 100

@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import io
+import os
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -12,13 +15,23 @@ import pytest
 pytest.importorskip("rclpy")
 from helpers import sessions
 
+from pneumo_ros.cli.main import main
+
 RIG = "rig:\n  sprung_mass: {{value: {mass}, std: 0.2, unit: {unit}}}\n"
 
 
 def refused(tmp_path: Path, *options: str) -> str:
-    path = tmp_path / "session.mcap"
-    code, said = sessions.run("--output", str(path), *options)
-    assert code == 2, said
+    """What the command says before it ends; in this process, as nothing is started."""
+    words = ["pneumo", "run", "--domain", str(sessions.own_domain()), "--output", str(tmp_path / "session.mcap")]
+    out = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(out):
+        for name in ("NUMBA_CACHE_DIR", "PYTHONSAFEPATH"):  # the program sets them where they are not
+            patch.setenv(name, os.environ.get(name, ""))
+        patch.setattr(sys, "argv", [*words, *options])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    said = out.getvalue()
+    assert ended.value.code == 2, said
     assert len(said.strip().splitlines()) == 1 and said.startswith("error: "), said
     assert list(tmp_path.glob("session*")) == []
     return said
@@ -90,7 +103,7 @@ def test_existing_log_is_not_overwritten(tmp_path: Path) -> None:
     path = tmp_path / "taken.mcap"
     path.write_bytes(b"precious")
     code, said = sessions.run("--output", str(path))
-    assert code == 2 and "exists" in said
+    assert code == 2 and "exists" in said and said.startswith("error: ") and len(said.strip().splitlines()) == 1
     assert path.read_bytes() == b"precious"
 
 

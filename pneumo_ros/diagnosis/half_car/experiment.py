@@ -33,7 +33,7 @@ class Profile:
     name: str
     description: str
     road: Callable[[Array], Array]  # t (N,) -> (N, 2) m
-    valves: Callable[[Array], Array]  # t (N,) -> (N, 2) factor on the trimmed inlets
+    valves: Callable[[Array], Array]  # t (N,) -> (N, 4) factor on the trimmed openings, inlets then outlets
 
 
 def _flat(t: Array) -> Array:
@@ -41,7 +41,23 @@ def _flat(t: Array) -> Array:
 
 
 def _trimmed(t: Array) -> Array:
-    return np.ones((len(t), 2))
+    return np.ones((len(t), 4))
+
+
+def _closed(t: Array) -> Array:
+    """Trimmed for a second, then nothing flows."""
+    return np.repeat(np.where(t < 1.0, 1.0, 0.0)[:, None], 4, axis=1)
+
+
+def _half(t: Array) -> Array:
+    """Inlets and outlets together at whole and half openings, so that the rig keeps its height."""
+    return np.repeat(np.where(np.mod(t, 3.0) < 1.5, 1.0, 0.5)[:, None], 4, axis=1)
+
+
+def _pulses(t: Array) -> Array:
+    """Each outlet closed for 0.25 s in turn."""
+    closed = [np.mod(t - shift, 2.0) < 0.25 for shift in (0.5, 1.5)]
+    return np.column_stack([np.ones((len(t), 2)), np.where(np.column_stack(closed), 0.0, 1.0)])
 
 
 def _sweep(amplitude: float, low: float, high: float) -> Callable[[Array], Array]:
@@ -72,7 +88,8 @@ def _steps(size: float, hold: float) -> Callable[[Array], Array]:
     def valves(t: Array) -> Array:
         pattern = np.array([0.0, 1.0, -0.6, 0.5, -1.0, 0.8, -0.3, 0.0])
         rows = (t / hold).astype(int)
-        return 1.0 + size * np.column_stack([pattern[rows % 8], pattern[(rows + 3) % 8]])
+        inlets = 1.0 + size * np.column_stack([pattern[rows % 8], pattern[(rows + 3) % 8]])
+        return np.hstack([inlets, np.ones_like(inlets)])
 
     return valves
 
@@ -115,6 +132,19 @@ PROFILES = (
         _flat,
         _steps(0.04, 0.5),
     ),
+    Profile(
+        "valves-closed",
+        "all valves closed after 1 s on a slow heave of 6 mm: what leaks, and what the walls take",
+        _slow(6e-3),
+        _closed,
+    ),
+    Profile(
+        "valves-half",
+        "inlets and outlets together at half their openings every 1.5 s: flows that do not follow the opening",
+        _slow(2e-3),
+        _half,
+    ),
+    Profile("outlet-pulses", "each outlet closed for 0.25 s in turn: outlet against inlet", _flat, _pulses),
 )
 
 
@@ -132,15 +162,17 @@ def design_experiment(problem: Problem, best: Fit, rival: Fit) -> Experiment | N
     separation, profile, record = max(found, key=lambda item: item[0])
     time = np.arange(len(record.measured)) * record.period
     return Experiment(
-        profile.name, profile.description, separation, now, time, np.asarray(record.road), np.asarray(record.commands)
-    )
+        profile.name, profile.description, separation, now, time, np.asarray(record.road), np.asarray(record.commands),
+        len(PROFILES),
+    )  # fmt: skip
 
 
 def _record(model: RigModel, profile: Profile, at_rest: Trim, like: Any) -> Any:
     """A log-shaped record of the profile from rest."""
     t = np.arange(round(DURATION / PERIOD), dtype=np.float64) * PERIOD
     commands = np.tile(at_rest.command, (len(t), 1))
-    commands[:, :2] = np.clip(commands[:, :2] * profile.valves(t), 0.0, model.rig.inlet_area_max.value)
+    commands *= profile.valves(t)
+    commands[:, :2] = np.clip(commands[:, :2], 0.0, model.rig.inlet_area_max.value)
     road = profile.road(t) * np.minimum(1.0, t / 0.2)[:, None]
     rows = np.tile(model.simulate(like, rows=2)[:1], (len(t), 1))
     return replace(like, period=PERIOD, measured=rows, weight=np.ones_like(rows), commands=commands, road=road,

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,11 +16,9 @@ from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.competition import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
-from pneumo_ros.effects import library as own_effects
 from pneumo_ros.effects.configured import library_of, with_files
-from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.loading import origins
-from pneumo_ros.effects.parameters import Active, is_law
+from pneumo_ros.effects.loading import origins, own_ids
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import Rig
@@ -79,7 +77,9 @@ def prepared(
             raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
     logs = [first, *(read_signals(path, rig) for path in fit[1:])]
     model = RigModel(own, library, frozenset(without))
-    notes = [*_outside(library), *origins(library), *_standing_notes(model)]
+    names = own_ids(library)
+    told = [f"effects of your own that competed: {', '.join(names)}"] if names else []
+    notes = [*told, *origins(library), *_standing_notes(model)]
     if holdout is None:
         check_pair(logs, None)
         logs, held = split_by_time(logs)
@@ -92,13 +92,6 @@ def prepared(
     if changed is not None:
         notes += _about_edit(model, changed)
     return Task(model, tuple(logs), held, changed, tuple(notes))
-
-
-def _outside(library: Mapping[str, Effect]) -> list[str]:
-    """Which effects of the library are not the package's own: a reader must know who competed."""
-    folder = Path(str(own_effects.__file__)).parent
-    names = [name for name in library if is_law(name) and not (folder / f"{name}.py").exists()]
-    return [f"effects of your own that competed: {', '.join(names)}"] if names else []
 
 
 def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:

@@ -66,7 +66,7 @@ def budget(problem: Problem, best: Fit, holdout: Any, floor: float, nominal: flo
     """
     laws = best.candidate.laws
     players = [tuple(p for p in best.candidate.parts if _belongs(p, law, laws)) for law in laws]
-    squares = _squares(problem, best, holdout, players)
+    squares = _squares(problem, best, holdout, players, max(nominal, refit) ** 2)
     whole, last = max(nominal**2, 1e-12), float(np.mean(squares[frozenset(range(len(players)))]))
     fallen = float(np.mean(squares[frozenset()])) - last
     # The linear step of the tolerances is not quite the refit: its gap is the one that counts.
@@ -88,9 +88,13 @@ def _belongs(part: Part, law: Part, laws: Sequence[Part]) -> bool:
 
 
 def _squares(
-    problem: Problem, best: Fit, holdout: Any, players: Sequence[tuple[Part, ...]]
+    problem: Problem, best: Fit, holdout: Any, players: Sequence[tuple[Part, ...]], most: float
 ) -> dict[frozenset[int], Array]:
-    """Squared normalised error of each held-out row (N,), for every subset of effects, the tolerances answering."""
+    """Squared normalised error of each held-out row (N,), for every subset of effects, the tolerances answering.
+
+    A subset explains nothing at worst: its mean is ``most`` at most. What is half of a structure may run away where the
+    whole and the nothing do not, and two shares of a thousand with either sign tell nobody anything.
+    """
     model, there = problem.model, holdout.weight > 0.0
     acting = problem.active(best.candidate, problem.values(best.candidate, best.x))
     values = dict(zip(best.candidate.parts, acting, strict=True))
@@ -103,7 +107,8 @@ def _squares(
         active: list[Active] = [values[part] for part in kept]
         error = np.where(there, holdout.measured - free_run(model, holdout, moved, active), 0.0) / scale
         rows = np.sum(error**2 * (len(error) / counts), axis=1) / max(int(there.any(axis=0).sum()), 1)
-        out[subset] = np.where(np.isfinite(rows), np.minimum(rows, WILD), WILD)
+        rows = np.where(np.isfinite(rows), np.minimum(rows, WILD), WILD)
+        out[subset] = rows * min(1.0, most / max(float(np.mean(rows)), 1e-12))
     return out
 
 

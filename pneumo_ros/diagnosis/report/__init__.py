@@ -7,3 +7,5 @@ from pneumo_ros.diagnosis.report.outputs import write_outputs as write_outputs
 from pneumo_ros.diagnosis.report.page import render as render
 from pneumo_ros.diagnosis.report.page import write_report as write_report
 from pneumo_ros.diagnosis.report.residual_log import write_residual_log as write_residual_log
+from pneumo_ros.diagnosis.report.steps import Asked as Asked
+from pneumo_ros.diagnosis.report.story import Story as Story

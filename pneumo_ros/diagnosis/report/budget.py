@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.report.words import place_words
+from pneumo_ros.diagnosis.report.quantities import readable
+from pneumo_ros.diagnosis.report.words import effect_name, place_words, site_words
 
-INK, SOFT, NAMED, OTHER, LEFT = "#212529", "#5c6670", "#1c6fb8", "#adb5bd", "#e08e0b"
+INK, SOFT, NAMED, OTHER, LEFT = "#212529", "#5c6670", "#1c6fb8", "#adb5bd", "#f06514"
 DENSE = 0.25  # of the fullest bin: thinner ones are drawn faint
 SHOWN = 0.005  # share below which a row says nothing
 
@@ -36,17 +37,21 @@ def _row(words: str, share: object, kind: str, **more: object) -> dict[str, Any]
 
 
 def _entry_words(entry: Mapping[str, Any]) -> str:
-    name = " and ".join(effect.replace("_", " ") for effect in entry["effects"])
-    where = entry.get("side") or ", ".join(place_words(place) for place in entry["places"])
+    name = " and ".join(effect_name(effect) for effect in entry["effects"])
+    where = site_words(entry.get("side") or "") or ", ".join(place_words(place) for place in entry["places"])
     return f"{name} ({where})" if where else name
 
 
-def waterfall(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Shares of the squared nominal gap as an inline SVG, from the whole gap down to nothing."""
-    figure = Figure(figsize=(8.6, 0.34 * len(rows) + 0.5))
-    axes = figure.add_axes((0.42, 0.16, 0.5, 0.82))
+def waterfall(rows: Sequence[Mapping[str, Any]], blamed: bool = True) -> str:
+    """Shares of the squared nominal gap as an inline SVG, from the whole gap down to nothing.
+
+    ``blamed`` : whether something is missing; where nothing is, what is left is painted as quietly as the rest
+    """
+    height = 0.36 * len(rows) + 0.55
+    figure = Figure(figsize=(6.4, height))
+    axes = figure.add_axes((0.44, 0.45 / height, 0.44, 1.0 - 0.5 / height))
     left = 1.0
-    colours = {"effect": NAMED, "refit": OTHER, "rest": LEFT, "floor": "#dee2e6"}
+    colours = {"effect": NAMED, "refit": OTHER, "rest": LEFT if blamed else OTHER, "floor": "#dee2e6"}
     for k, row in enumerate(rows):
         share = row["share"]
         axes.barh(k, -share, left=left, color=colours[row["kind"]], height=0.66)
@@ -66,15 +71,16 @@ def curve_plot(curve: Mapping[str, Any]) -> str:
     points = np.asarray(curve["points"], dtype=float)
     figure = Figure(figsize=(5.6, 2.7))
     axes = figure.add_axes((0.16, 0.2, 0.8, 0.75))
-    x, y, low, high, weight = points.T
+    (along, x_factor), (up, y_factor) = (readable(curve[key]["unit"], points[:, k]) for k, key in enumerate("xy"))
+    x, y, low, high, weight = points.T * np.array([[x_factor], [y_factor], [y_factor], [y_factor], [1.0]])
     dense = weight >= DENSE * weight.max()
     axes.fill_between(x, low, high, color=NAMED, alpha=0.15, linewidth=0)
     axes.plot(x, y, color=NAMED, linewidth=1.2, alpha=0.5)
     axes.plot(np.where(dense, x, np.nan), y, color=NAMED, linewidth=2.4)
     axes.axhline(0.0, color=OTHER, linewidth=0.8)
     axes.set_ylim(*_limits(y, low, high, dense))
-    axes.set_xlabel(f"{curve['x']['name']}, {curve['x']['unit']}", fontsize=9)
-    axes.set_ylabel(f"{curve['y']['name']}, {curve['y']['unit']}", fontsize=9)
+    axes.set_xlabel(f"{curve['x']['name']}, {along}", fontsize=9)
+    axes.set_ylabel(f"{curve['y']['name']}, {up}", fontsize=9)
     axes.ticklabel_format(axis="both", style="sci", scilimits=(-3, 4))
     _quiet(axes)
     return _svg(figure)

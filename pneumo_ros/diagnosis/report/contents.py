@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,47 +12,26 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
-from pneumo_ros.diagnosis.report.rig_map import draw_map
+from pneumo_ros.diagnosis.report.quantities import quantity_cells, readable
+from pneumo_ros.diagnosis.report.steps import Asked
+from pneumo_ros.diagnosis.report.story import Known, Story, gains, own_parameters, story
 from pneumo_ros.diagnosis.report.words import (
     LIKELY,
-    confidence,
-    headline,
+    effect_name,
     how_far,
-    next_steps,
     percent,
     place_words,
     sentence,
+    site_words,
+    whole_percents,
     winner,
 )
-from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.where import Law
 
 ZOOM = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off
 SHOWN_CHANNELS = 2  # the rest is folded away
-TITLES = {
-    "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
-    "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
-}  # fmt: skip
-UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
-
-
-@dataclass(frozen=True)
-class RigCard:
-    """How the page speaks of a rig: its name, what its channels are called and shown in, and its picture.
-
-    ``units`` : channel -> unit shown and factor to it; ``picture`` : shares by place -> SVG
-    """
-
-    name: str
-    titles: Mapping[str, str]
-    units: Mapping[str, tuple[str, float]]
-    picture: Callable[[Mapping[str, float]], str]
-
-
-def half_car_card(name: str) -> RigCard:
-    """The half car's."""
-    return RigCard(name, TITLES, UNITS, draw_map)
 
 
 @dataclass(frozen=True)
@@ -65,11 +44,14 @@ class Findings:
     trajectories : "nominal", "refit" and "best" -> (N, 6) free runs on the held-out log
     holdout : the held-out log
     fit_names : names of the logs fitted
-    card : how the page speaks of the rig
-    phrases : effect id -> what it is, in words
+    library : effect id -> effect
+    priors : parameter of the rig -> its nominal value and standard deviation
+    own : ids of the user's own effects that competed
+    asked : what was typed
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
     laws : what is missing at the places, as curves
+    card : how the page speaks of the rig
     mended : held-out gap with flexible corrections at the places found, no law named; None to leave it out
     """
 
@@ -77,44 +59,62 @@ class Findings:
     trajectories: Mapping[str, Array]
     holdout: Any
     fit_names: Sequence[str]
-    card: RigCard
-    phrases: Mapping[str, str] = field(default_factory=dict)
+    library: Mapping[str, Any] = field(default_factory=dict)
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    own: Sequence[str] = ()
+    asked: Asked | None = None
     regimes: Sequence[str] = ()
     conditional: Mapping[str, float] = field(default_factory=dict)
     laws: Sequence[Law] = ()
     mended: float | None = None
+    card: RigCard = HALF_CAR
+
+    @property
+    def phrases(self) -> dict[str, str]:
+        """Effect id -> what it is, in words."""
+        return {name: effect.summary for name, effect in self.library.items()}
+
+
+def told(found: Findings) -> Story:
+    """The first screen."""
+    known = Known(
+        found.library, gains(found.holdout, found.trajectories, found.card), found.priors, found.own, found.asked
+    )
+    return story(found.summary, known)
 
 
 def contents(found: Findings) -> dict[str, Any]:
     """Variables of the template."""
     summary = found.summary
-    told = summary["verdict"] != "not_testable"  # without a verdict no place, candidate or size may look like one
-    shares = {entry["place"]: float(entry["share"]) for entry in summary.get("location", []) if told}
-    charts = _charts(found)
+    told_of = summary["verdict"] != "not_testable"  # without a verdict no place, candidate or size may look like one
+    blamed = told_of and summary["verdict"] != "none"  # where nothing is missing, no part of the rig is painted
+    shares = _shares(summary) if blamed else {}
+    charts, first = _charts(found), told(found)
     return {
-        "title": f"Gap of {found.card.name}",
+        "title": f"Gap of {_rig_name(found)}",
         "verdict": summary["verdict"],
-        "headline": headline(summary, found.phrases),
-        "confidence": confidence(summary),
+        "headline": first.headline,
+        "confidence": first.confidence,
+        "facts": [{"name": name, "text": text} for name, text in first.facts],
         "tone": _tone(summary),
         "how_far": how_far(summary),
-        "next_steps": next_steps(summary, found.fit_names),
-        "waterfall": waterfall(budget_rows(summary)) if told and summary.get("budget") else "",
-        "measured": _measured(summary) if told else [],
+        "next_steps": [{"text": step.text, "commands": step.commands} for step in first.steps],
+        "waterfall": waterfall(budget_rows(summary), blamed) if told_of and summary.get("budget") else "",
+        "measured": _measured(summary) if blamed else [],
         "map": found.card.picture(shares),
         "places": [
-            {"name": place, "words": place_words(place), "share": share}
-            for place, share in shares.items()
-            if share >= 0.01
+            {"name": place, "words": place_words(place), "share": whole}
+            for place, whole in zip(shares, whole_percents(list(shares.values())), strict=True)
+            if whole >= 1
         ],
-        "laws": [_law(law) for law in found.laws],
+        "laws": [_law(law) for law in found.laws] if blamed else [],
         "ladder": ladder(_rungs(summary["gap"], found.mended)),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
-        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10] if told],
-        "parameters": _parameters(summary) if told else [],
-        "own": [_quantity(name, value) for name, value in (summary.get("nuisance") or {}).items() if told],
-        "ambiguity": _ambiguity(summary, found.phrases) if told else [],
+        "ranking": [_candidate(entry, found.phrases) for entry in summary.get("ranking", [])[:10] if told_of],
+        "parameters": _parameters(summary) if told_of else [],
+        "own": own_parameters(summary, found.priors) if told_of else [],
+        "ambiguity": _ambiguity(summary, found.phrases) if told_of else [],
         "rivals_are": _RIVALS.get(str(summary["verdict"]), "These fit it almost as well as the verdict:"),
         "experiment": summary.get("next_experiment"),
         "edit": _edit(summary),
@@ -125,9 +125,13 @@ def contents(found: Findings) -> dict[str, Any]:
         "topics": found.holdout.topics,
         "fit_names": list(found.fit_names),
         "holdout_name": found.holdout.name,
-        "rig": found.card.name,
+        "rig": _rig_name(found),
         "seconds": len(found.holdout.measured) * found.holdout.period,
     }
+
+
+def _rig_name(found: Findings) -> str:
+    return found.card.name or str(found.holdout.rig.name)
 
 
 def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -137,8 +141,8 @@ def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         held = row["entry"] if row["kind"] == "effect" else summary["remainder"] if row["kind"] == "rest" else {}
         if held.get("curve"):
             law = str(held.get("law", ""))
-            known = "as no law of the library" if law in ("", "differs") else "as the library's law"
-            out.append({"plot": curve_plot(held["curve"]), "text": f"{sentence(row['words'])}, {known}."})
+            known = "no law of the library" if law in ("", "differs") else "as the library's law has it"
+            out.append({"plot": curve_plot(held["curve"]), "text": sentence(f"{row['words']}: {known}")})
     return out
 
 
@@ -170,7 +174,7 @@ def _charts(found: Findings) -> list[dict[str, str]]:
 
 
 def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
-    log, name = found.holdout, list(found.card.units)[c]
+    log, name = found.holdout, list(found.card.titles)[c]
     unit, factor = found.card.units[name]
     measured = np.where(log.weight[:, c] > 0, log.measured[:, c], np.nan) * factor
     lines = [Line("log", "log", measured[first:last])]
@@ -200,15 +204,23 @@ def _zoom(log: Any, refit: Array) -> tuple[int, int]:
     return first, first + rows
 
 
+def _shares(summary: Mapping[str, Any]) -> dict[str, float]:
+    """Place -> share of the gap; together at most one."""
+    found = {str(e["place"]): max(float(e["share"]), 0.0) for e in summary.get("location") or []}
+    total = max(sum(found.values()), 1.0)
+    return {place: share / total for place, share in found.items()}
+
+
 def _sides(entry: Mapping[str, Any]) -> str:
-    sites = [site.replace("_", " ") for site in entry.get("sites", []) if site]
+    sites = [site_words(site) for site in entry.get("sites", []) if site]
     return ", ".join(dict.fromkeys(sites)) or str(entry.get("side") or "")
 
 
 def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str, Any]:
     low, high = entry["shrink_ci90"]
     return {
-        "name": " + ".join(entry["effects"]),
+        "name": " + ".join(effect_name(effect) for effect in entry["effects"]),
+        "ids": ", ".join(entry["effects"]),
         "side": _sides(entry),
         "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
         "probability": float(entry["probability"]),
@@ -234,43 +246,7 @@ def _law(law: Law) -> dict[str, str]:
 def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     if not summary.get("ranking"):
         return []
-    return [_quantity(name, value) for name, value in winner(summary)["parameters"].items()]
-
-
-def _quantity(name: str, quantity: Mapping[str, Any]) -> dict[str, str]:
-    value, std = float(quantity["value"]), float(quantity.get("std") or 0.0)
-    unit, factor = readable(str(quantity.get("unit") or "1"), np.array([value]))
-    shown = "" if unit == "1" else unit
-    return {"name": name.replace("_", " "), "value": rounded(value * factor, std * factor), "unit": shown}
-
-
-_READABLE = {
-    "m": (("mm", 1e3, 0.5), ("µm", 1e6, 5e-4)), "m2": (("mm²", 1e6, 1e-2),), "m3": (("cm³", 1e6, 1e-2),),
-    "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 5e-3)),
-}  # fmt: skip
-
-
-def readable(unit: str, values: Array) -> tuple[str, float]:
-    """Unit and factor that make values of an SI unit easy to read: mm for millimetres, kPa for pressures."""
-    size = float(np.max(np.abs(values))) if len(values) else 0.0
-    found = (unit, 1.0)
-    for name, factor, below in _READABLE.get(unit, ()):
-        if 0.0 < size < below:
-            found = (name, factor)
-    return found
-
-
-def rounded(value: float, std: float) -> str:
-    """Value and standard deviation, the latter with two digits; four digits of the value without one."""
-    if not np.isfinite(std) or std <= 0.0:
-        return f"{value:.4g}"
-    digits = int(np.floor(np.log10(std))) - 1
-    if digits >= -6 and abs(value) < 1e6:
-        places = max(-digits, 0)
-        return f"{value:.{places}f} ± {std:.{places}f}"
-    power = int(np.floor(np.log10(max(abs(value), std))))
-    places = max(power - digits, 0)
-    return f"({value / 10.0**power:.{places}f} ± {std / 10.0**power:.{places}f})·10^{power}"
+    return [quantity_cells(name, value) for name, value in winner(summary)["parameters"].items()]
 
 
 _RIVALS = {
@@ -283,7 +259,8 @@ def _ambiguity(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> list[s
     """Rivals of the verdict, itself left out; a pair ("a+b") in the words of its parts."""
     rivals = [name for name in summary.get("ambiguity_group", []) if name != summary["verdict"]]
     words = [" and ".join(phrases.get(part, "") for part in name.split("+")) for name in rivals]
-    return [f"{name}: {said}" if said else name for name, said in zip(rivals, words, strict=True)]
+    names = [effect_name(name).replace("+", " and ") for name in rivals]
+    return [f"{name}: {said}" if said else name for name, said in zip(names, words, strict=True)]
 
 
 def _edit(summary: Mapping[str, Any]) -> str:
@@ -302,9 +279,15 @@ def _edit(summary: Mapping[str, Any]) -> str:
 def _refused(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     """Explanations that something counts against, and those that this log could not have shown."""
     out = [
-        {"name": " + ".join(entry["effects"]), "side": entry.get("side") or "", "why": "; ".join(entry["notes"])}
+        {
+            "name": " + ".join(effect_name(e) for e in entry["effects"]),
+            "side": entry.get("side") or "",
+            "why": "; ".join(entry["notes"]),
+        }
         for entry in summary.get("ranking", [])
         if entry.get("notes")
     ]
     hidden: Mapping[str, str] = summary.get("not_testable") or {}
-    return out + [{"name": name, "side": "", "why": f"not testable here: {why}"} for name, why in hidden.items()]
+    return out + [
+        {"name": effect_name(name), "side": "", "why": f"not testable here: {why}"} for name, why in hidden.items()
+    ]

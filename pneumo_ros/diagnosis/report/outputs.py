@@ -5,20 +5,24 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, total_gap
-from pneumo_ros.diagnosis.report.contents import Findings, half_car_card
+from pneumo_ros.diagnosis.report.contents import Findings, told
 from pneumo_ros.diagnosis.report.page import write_report
 from pneumo_ros.diagnosis.report.residual_log import write_residual_log
+from pneumo_ros.diagnosis.report.steps import Asked
+from pneumo_ros.diagnosis.report.story import Story
 from pneumo_ros.diagnosis.result import Diagnosis, write_json
 from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.diagnosis.where import Location, conditional_gaps, habitat, locate, missing_law, predict_located
 from pneumo_ros.diagnosis.where.design import car_of
 from pneumo_ros.diagnosis.where.regimes import harmonics
+from pneumo_ros.effects.loading import laws_of, own_ids
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 
@@ -50,7 +54,8 @@ def write_outputs(
     fit: Sequence[Signals],
     holdout: Signals,
     location: Location | None = None,
-) -> list[Path]:
+    asked: Asked | None = None,
+) -> tuple[list[Path], Story]:
     """Write all files of a diagnosis of the half car; older ones of the same names are replaced.
 
     diagnosis.json, which programs look for, comes last: where it is new, the others are.
@@ -60,6 +65,11 @@ def write_outputs(
     folder : made if it is not there
     fit, holdout : the logs that were fitted and held out
     location : from :func:`pneumo_ros.diagnosis.where.locate` on these logs, if it is at hand
+    asked : what the user typed
+
+    Returns
+    -------
+    The files, and what the report says first.
 
     Raises
     ------
@@ -68,10 +78,11 @@ def write_outputs(
     """
     claim_folder(folder)
     where = location or locate(model, fit, holdout)
-    write_report(folder / FILES[1], _findings(diagnosis, model, fit, holdout, where))
+    findings = replace(_findings(diagnosis, model, fit, holdout, where), asked=asked)
+    write_report(folder / FILES[1], findings)
     write_residual_log(folder / FILES[2], holdout, diagnosis.trajectories)
     write_json(diagnosis, folder / FILES[0])
-    return [folder / name for name in FILES]
+    return [folder / name for name in FILES], told(findings)
 
 
 def _findings(
@@ -85,8 +96,9 @@ def _findings(
         trajectories=runs,
         holdout=holdout,
         fit_names=[log.name for log in fit],
-        card=half_car_card(holdout.rig.name),
-        phrases={name: effect.summary for name, effect in model.library.items()},
+        library=laws_of(model.library),
+        priors={p.name: (p.nominal, p.std) for p in model.parameters},
+        own=own_ids(model.library),
         regimes=_sentences(where, holdout, error) if telling else [],
         conditional=conditional_gaps(car_of(model, where.start.values(model, where.refit_nuisance)), holdout),
         mended=_mended(model, where) if telling and where.followed and diagnosis.verdict == "unknown" else None,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict in sentences, for the report and for the terminal: what, how sure, how far, and what to do next."""
+"""The verdict in sentences, for the report and for the terminal: what, where, how sure, how far."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,11 +20,11 @@ def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
     if verdict == "none":
         return "No unmodelled effect: the rig's own tolerances explain the log."
     if verdict == "not_testable":
-        reason = _forbidden(summary)
+        reason = forbidden(summary)
         return f"No verdict. {reason}." if reason else (
             "This log cannot tell: it did not excite the rig enough to show an effect.")  # fmt: skip
     if verdict == "unknown":
-        return f"Something that no listed effect explains, at {_first_place(summary) or 'a place that is not clear'}."
+        return f"Something that no listed effect explains, at {first_place(summary) or 'a place that is not clear'}."
     entry = winner(summary)
     sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
     parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
@@ -31,9 +32,10 @@ def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
 
 
 def confidence(summary: Mapping[str, Any]) -> str:
-    """How sure, in words and in per cent."""
-    if summary["verdict"] == "not_testable":
-        return "no verdict"
+    """How sure of the name, in words and in per cent; where there is no name there is nothing to be sure of."""
+    verdict = summary["verdict"]
+    if verdict in UNNAMED:
+        return {"not_testable": "no verdict", "none": "nothing to name", "unknown": "no name fits"}[verdict]
     p = float(summary["probability"])
     word = "sure" if p >= SURE else "likely" if p >= LIKELY else "not sure"
     return f"{word}: {'above 99' if p > 0.99 else format(100 * p, '.0f')} %"
@@ -52,63 +54,36 @@ def how_far(summary: Mapping[str, Any]) -> str:
     low, high = best["shrink_ci90"]
     return (
         f"Adding it shrinks the held-out gap from {gap['refit']:.3g} (parameters re-estimated inside their tolerances) "
-        f"to {gap['best']:.2g}, by {percent(best['shrink'])} (90 % interval {percent(low)} to {percent(high)}); "
+        f"to {gap['best']:.2g}, by {percent(best['shrink'])}{interval(low, high)}; "
         f"sensor noise alone would leave {gap['noise_floor']:.2g}."
     )
 
 
-def next_steps(summary: Mapping[str, Any], logs: Sequence[str] = ("FIT.mcap",)) -> list[str]:
-    """What to do with the verdict, the most useful first; ``logs`` are the names of those that were fitted."""
-    verdict, experiment = str(summary["verdict"]), summary.get("next_experiment")
-    if verdict == "not_testable":
-        return [_record_again(summary)]
-    steps = []
-    if experiment:
-        steps.append(f"Run {experiment.get('command') or experiment['file']} and diagnose its log together with "
-                     f"{' and '.join(logs)}: {str(experiment['description']).rstrip('.')}.")  # fmt: skip
-    elif float(summary["probability"]) < LIKELY:
-        steps.append(
-            f"Log a second session on another road and fit both: pneumo diagnose {' '.join(logs)} SECOND.mcap."
-        )
-    if verdict == "none":
-        steps.append("Keep the model. Its re-estimated parameters are worth using: --save-rig RIG.yaml writes them.")
-    elif verdict == "unknown":
-        idea = ("a further slot of rig.py (docs/your-rig.md)" if summary.get("rig_model") else
-                "a Python file: --effect MY_EFFECT.py (docs/diagnosis.md shows one)")  # fmt: skip
-        steps.append(f"Look at {_first_place(summary) or 'the curves below'}. An idea becomes a candidate as {idea}.")
-    else:
-        taken = "--rig" if summary.get("rig_model") else "--rig of every verb"
-        steps.append(f"Look at {_first_place(summary) or 'it'} on the rig, or keep the effect in the model: "
-                     f"--save-rig RIG.yaml writes it for {taken}.")  # fmt: skip
-    return steps
-
-
-def _record_again(summary: Mapping[str, Any]) -> str:
-    if _forbidden(summary):
-        return "Mend what is listed under what limits this, and record the session again."
-    if summary.get("rig_model"):
-        return "Record a log that moves more, or longer."
-    return ("Record a session that moves more: a rougher road (pneumo run --road D, or E) with the valves at work, "
-            "15 s or longer.")  # fmt: skip
-
-
-def _forbidden(summary: Mapping[str, Any]) -> str:
+def forbidden(summary: Mapping[str, Any]) -> str:
     """The limitation of a log that forbids a verdict, without its closing words; '' where none does."""
     notes = (str(note) for note in summary.get("notes", ()))
     told = next((note for note in notes if note.endswith(NO_VERDICT)), "")
     return told.removesuffix(NO_VERDICT)
 
 
-def _first_place(summary: Mapping[str, Any]) -> str:
+def first_place(summary: Mapping[str, Any]) -> str:
     """The place with the largest share, in words; '' where none stands out."""
     places = [entry for entry in summary.get("location") or [] if float(entry["share"]) >= STANDS_OUT]
     return place_words(places[0]["place"]) if places else ""
 
 
+_SENSORS = {
+    "sprung_front": "the LVDT at the body's front", "sprung_rear": "the LVDT at the body's rear",
+    "unsprung_front": "the front axle's LVDT", "unsprung_rear": "the rear axle's LVDT",
+    "front_pressure": "the front pressure sensor", "rear_pressure": "the rear pressure sensor",
+}  # fmt: skip
+
+
 def place_words(place: str) -> str:
     """A contract place in words."""
     if place.startswith("sensor:"):
-        return f"the sensor {place.removeprefix('sensor:').replace('_', ' ')}"
+        channel = place.removeprefix("sensor:")
+        return _SENSORS.get(channel, f"the sensor {channel.replace('_', ' ')}")
     words = {
         "body_heave": "the body (up and down)", "body_pitch": "the body (pitch)", "road_input": "the road input",
         "supply": "the air supply",
@@ -133,17 +108,62 @@ def _effect_words(effect: str, side: str | None, phrases: Mapping[str, str]) -> 
     what = phrases.get(effect, effect.replace("_", " "))
     where = {"both": "at both ends", "front": "at the front", "rear": "at the rear"}.get(side or "")
     if where is None:
-        return f"{what} ({side.replace('_', ' ')})" if side else what
+        return f"{what}: {site_words(side)}" if side else what
     return f"{where}, {what}"
 
 
 def sentence(text: str) -> str:
-    """A text with a capital and a full stop."""
+    """A text with a capital and a full stop; a name of a file, a topic or an effect keeps its letters."""
     text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+    first = text.split(" ", 1)[0].rstrip(":,;.")
+    name = any(sign in first for sign in "./_<>") or any(digit.isdigit() for digit in first)
+    capital = text if name else text[:1].upper() + text[1:]
+    return capital + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def percent(share: float) -> str:
     """Whole per cent, with a digit more where 99.6 would read as 100."""
     value = 100.0 * share
     return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{value:.0f} %"
+
+
+def interval(low: float, high: float) -> str:
+    """`` (90 % interval 92 % to 94 %)``, with the digits that its ends differ by; '' where two do not show one."""
+    for form in ("{:.0f} %", "{:.1f} %"):
+        ends = [form.format(100.0 * share) for share in (low, high)]
+        if ends[0] != ends[1]:
+            return f" (90 % interval {ends[0]} to {ends[1]})"
+    return ""
+
+
+def whole_percents(shares: Sequence[float]) -> list[int]:
+    """Shares as whole per cent that add up to what their sum rounds to, and to no more than 100."""
+    total = sum(max(share, 0.0) for share in shares)
+    scaled = [100.0 * max(share, 0.0) / max(total, 1.0) for share in shares]
+    out = [int(value) for value in scaled]
+    spare = round(sum(scaled)) - sum(out)
+    for k in sorted(range(len(out)), key=lambda k: out[k] - scaled[k])[:spare]:
+        out[k] += 1
+    return out
+
+
+def effect_name(effect: str) -> str:
+    """An id in words: ``lvdt_scale`` is "LVDT scale"."""
+    words = effect.replace("_", " ")
+    return re.sub(r"\b(lvdt|cg)\b", lambda found: found[0].upper(), words)
+
+
+def site_words(site: str) -> str:
+    """A site of an effect in words; '' for the whole rig."""
+    known = {"both": "both ends", "front": "front", "rear": "rear"}
+    return known.get(site, place_words(f"sensor:{site}") if site else "")
+
+
+def structure_words(entry: Mapping[str, Any]) -> str:
+    """Effects of an entry of the ranking with their sites: "LVDT scale (the sensor unsprung front)"."""
+    sites = list(entry.get("sites") or [entry.get("side")] * len(entry["effects"]))
+    sites += [None] * (len(entry["effects"]) - len(sites))
+    parts = [
+        (effect_name(effect), site_words(site or "")) for effect, site in zip(entry["effects"], sites, strict=True)
+    ]
+    return " and ".join(f"{name} ({where})" if where else name for name, where in parts)

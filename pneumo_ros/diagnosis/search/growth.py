@@ -26,9 +26,10 @@ SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
 SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
 COUNTS = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end
 EXCHANGED = (8, 1, 1)  # the same for each effect that is exchanged
-TURNS = 10  # additions and exchanges at most
-STRANGE = 4.0  # mean square on the kept blocks, sigmas: above it something is missing that no addition may help
-WORTH = 8.0  # of the cost with its tolls: what a turn must gain
+TURNS = 9  # additions and exchanges at most
+STRANGE, LEFT = 4.0, 0.01  # mean square on the kept blocks, in sigmas and of the refit's: above both something is wrong
+STEP = 0.3  # of the gain that would be evident: what a turn must bring, as a step towards one that is
+EXCHANGES, MISSED_LEAST = 3, 3  # times that no addition helps; effects that are then tried for exchange
 STEPS = 5
 IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
 
@@ -40,7 +41,7 @@ def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
         contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
     best = _selected(contest, limits)
     if further and best.size and room_for_more(contest):
-        _climb(contest, best.fit)
+        _climb(contest, best, max(limits.second_cost, limits.second_share * best.samples))
         best = _selected(contest, limits)
     if best.size > 1:
         _refine(contest, best, limits)
@@ -49,23 +50,25 @@ def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
         contest.structures.append(_without_idle_shapes(contest, best.fit))
 
 
-def _climb(contest: Contest, start: Fit) -> None:
+def _climb(contest: Contest, start: Scored, evident: float) -> None:
     """Structures of ever more effects, by floating search (Pudil, Novovicova, Kittler 1994, Pattern Recognition Letters
     15, 1119-1125): after each addition, an effect that the others have made needless goes, and what has room then may
-    come; where no addition helps, one is exchanged.
+    come; where no addition helps, one is exchanged. ``evident`` is the gain that a further effect must bring at last.
     """
-    problem = contest.problem
+    problem, worth, exchanges = contest.problem, STEP * evident, EXCHANGES
 
     def price(one: Fit) -> float:
         return score(problem, one).price
 
-    current, known = start, {len(start.candidate.laws): price(start)}
+    strange = max(STRANGE, LEFT * score(problem, contest.refit).level)
+    current, known = start.fit, {start.size: start.price}
     for turn in range(TURNS):
         contest.progress(0.84 + 0.05 * turn / TURNS, f"beside {current.candidate.label}")
         size = len(current.candidate.laws)
         found = _one_more(contest, current) if size < MOST else []
-        if not found or min(map(price, found)) > price(current) - WORTH:
-            found = _one_exchanged(contest, current) if score(problem, current).level > STRANGE else []
+        if not found or min(map(price, found)) > price(current) - worth:
+            wrong = exchanges > 0 and score(problem, current).level > strange
+            found, exchanges = _one_exchanged(contest, current, worth) if wrong else [], exchanges - 1
         if not found:
             break
         contest.structures += found
@@ -73,7 +76,7 @@ def _climb(contest: Contest, start: Fit) -> None:
         size = len(current.candidate.laws)
         known[size] = min(price(current), known.get(size, np.inf))
         less = _one_less(problem, current) if size > 2 else None
-        if less is not None and price(less) < known.get(size - 1, np.inf) - WORTH:
+        if less is not None and price(less) < known.get(size - 1, np.inf) - worth:
             contest.structures.append(less)
             current, known[size - 1] = less, price(less)
         if not room_for_more(contest):
@@ -87,13 +90,14 @@ def _one_less(problem: Problem, found: Fit) -> Fit | None:
     return None if best.diverged else reduced(problem, best, (), STEPS)
 
 
-def _one_exchanged(contest: Contest, found: Fit) -> list[Fit]:
+def _one_exchanged(contest: Contest, found: Fit, worth: float) -> list[Fit]:
     """The structure with one of its effects exchanged for what helps more, those it misses least first."""
     problem = contest.problem
     without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws]
-    for bare in sorted((one for one in without if not one.diverged and one.candidate.laws), key=lambda one: one.cost):
+    usable = sorted((one for one in without if not one.diverged and one.candidate.laws), key=lambda one: one.cost)
+    for bare in usable[:MISSED_LEAST]:
         other = _one_more(contest, bare, EXCHANGED)
-        if other and score(problem, other[0]).price < score(problem, found).price - WORTH:
+        if other and score(problem, other[0]).price < score(problem, found).price - worth:
             return other
     return []
 

@@ -19,6 +19,9 @@ QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion 
 FEW = 100  # samples from which a typical run length is taken
 RUN_FACTOR = 5.0  # times the run length that quantisation explains elsewhere in the channel
 GLITCH_SIGMA = 15.0
+# What nearly every sample keeps to, as sigmas of a normal law: a chattering valve makes a zigzag of the pressure,
+# each of whose tips stands alone, and the median of a median filter's rest says nothing.
+COMMON, COMMON_SIGMA = 0.98, 2.33
 MOSTLY = 0.5  # a channel with fewer real samples than this share is left out
 NOISE_FACTOR = 2.0  # estimated against stated noise, either way
 DISPLACEMENT_LIMIT = 0.5  # m; the rig is 0.5 m long and moves by centimetres
@@ -142,7 +145,7 @@ def _moving(values: Array) -> NDArray[np.bool_]:
 
 def _without_glitches(name: str, values: Array, weight: Array, noise: float, found: list[Limitation]) -> Array:
     rest = np.abs(values - median_filter(values, 5, mode="nearest"))
-    spread = 1.4826 * float(np.median(rest[weight > 0]))
+    spread = float(np.quantile(rest[weight > 0], COMMON)) / COMMON_SIGMA if weight.any() else 0.0
     bad = (weight > 0) & (rest > GLITCH_SIGMA * max(noise, spread, 1e-12))
     count = int(np.count_nonzero(bad))
     if not count:

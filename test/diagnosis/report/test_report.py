@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from html import escape, unescape
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,12 +15,15 @@ import pytest
 from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.diagnosis.report import Findings, render, write_outputs, write_report, write_residual_log
-from pneumo_ros.diagnosis.report.contents import half_car_card, readable, rounded
 from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
+from pneumo_ros.diagnosis.report.quantities import readable, rounded
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
-from pneumo_ros.diagnosis.report.words import confidence, headline, next_steps, place_words
+from pneumo_ros.diagnosis.report.steps import Asked, next_steps
+from pneumo_ros.diagnosis.report.story import Known, gains, story
+from pneumo_ros.diagnosis.report.words import confidence, headline, interval, place_words, sentence, whole_percents
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
 from pneumo_ros.diagnosis.signals import MEASURED
+from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -30,6 +34,16 @@ PLACES = (
     "front_force", "rear_force", "front_air", "rear_air", "front_tyre", "rear_tyre", "body_heave", "body_pitch",
     "road_input", "supply", *(f"sensor:{name}" for name in MEASURED),
 )  # fmt: skip
+
+
+LIBRARY = {
+    name: replace(load_library()[name], summary=said)
+    for name, said in {
+        "leak": "the spring leaks",
+        "orifice_coefficient": "an orifice",
+        "valve_lag": "a slow valve",
+    }.items()
+}
 
 
 def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
@@ -55,14 +69,7 @@ def findings(verdict: str = "leak", probability: float = 0.97) -> Findings:
                 "per_channel": {name: {"nominal": 1.2, "refit": 0.4, "best": 0.01} for name in MEASURED}},
     }  # fmt: skip
     runs = {"nominal": clean + 3 * log.scale, "refit": clean + 0.4 * log.scale, "best": clean}
-    return Findings(
-        summary,
-        runs,
-        log,
-        ["fit.mcap"],
-        half_car_card(log.rig.name),
-        {"leak": "the spring leaks", "orifice_coefficient": "an orifice"},
-    )
+    return Findings(summary, runs, log, ["fit.mcap"], LIBRARY)
 
 
 class Balance(HTMLParser):
@@ -99,10 +106,10 @@ def test_the_page_is_whole_and_refers_to_nothing_outside() -> None:
 def test_the_page_says_verdict_place_size_and_shrink() -> None:
     page = render(findings())
     assert "At the front, the spring leaks." in page and "sure: 97 %" in page
-    assert "by 98 % (90 % interval 96 % to 99.0 %)" in page
+    assert "by 98 % (90 % interval 96 % to 99 %)" in page
     assert "the front air and valve" in page and "93 %" in page
     assert "0.4100 ± 0.0020" in page and "mm²" in page
-    assert "orifice_coefficient: an orifice" in page
+    assert "orifice coefficient: an orifice" in page
     assert "Open both inlets fully. It would drive the rivals 31 times the noise apart" in page
     assert "<code>pneumo run --road a.csv --valves b.csv</code>" in page
     assert "droop ended at its bound" in page and "not testable here: the spring never came near it" in page
@@ -139,16 +146,22 @@ def test_a_pair_is_named_with_both_effects() -> None:
 
 def test_every_verdict_says_what_to_do_next() -> None:
     found = findings()
-    first, second = next_steps(found.summary, ["a.mcap"])
-    assert "pneumo run --road a.csv" in first and "a.mcap" in first
-    page = render(found)
-    assert "the front air and valve" in second and "--save-rig" in second
-    assert second in re.sub("</?span[^>]*>", "", page)
-    assert '<span class="option">--save-rig</span>' in page  # not broken over two lines
+    asked = Asked((Path("logs/a.mcap"),), Path("logs/b.mcap"), Path("out dir"))
+    first, second = next_steps(found.summary, asked)
+    played, diagnosed = first.commands
+    assert "--road 'out dir/next_experiment_road.csv'" in played and "--output logs/second.mcap" in played
+    assert diagnosed == "pneumo diagnose logs/a.mcap logs/second.mcap --holdout logs/b.mcap --output 'out dir-2'"
+    assert "the front air and valve" in second.text and "--save-rig 'out dir/rig.yaml'" in second.commands[0]
+    page = render(replace(found, asked=asked))
+    assert escape(second.text) in re.sub("</?span[^>]*>", "", page) and diagnosed in unescape(page)
+    assert '<span class="option">--rig</span>' in page  # not broken over two lines
     clear = {**found.summary, "next_experiment": None}
-    assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 1, 1]
-    assert "--effect" in next_steps({**clear, "verdict": "unknown"})[0]
-    assert "SECOND.mcap" in next_steps({**clear, "probability": 0.4})[0]
+    assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 2, 1]
+    closer, idea = next_steps({**clear, "verdict": "unknown"}, asked)
+    assert "the front air and valve" in closer.text and "--effect MY_EFFECT.py" in idea.commands[0]
+    assert "second session" in next_steps({**clear, "probability": 0.4}, asked)[0].text
+    kept = next_steps(clear, replace(asked, rig=Path("r.yaml")))
+    assert kept[0].commands == ("pneumo run --rig r.yaml",)
 
 
 def test_without_a_verdict_nothing_looks_like_one() -> None:
@@ -165,7 +178,7 @@ def test_the_verdict_itself_is_no_rival_of_its_own() -> None:
     alone = {**findings().summary, "ambiguity_group": ["leak"], "next_experiment": None}
     assert "cannot tell apart" not in render(replace(findings(), summary=alone))
     pair = {**alone, "ambiguity_group": ["leak", "leak+orifice_coefficient"]}
-    assert "leak+orifice_coefficient: the spring leaks and an orifice" in render(replace(findings(), summary=pair))
+    assert "leak and orifice coefficient: the spring leaks and an orifice" in render(replace(findings(), summary=pair))
 
 
 @pytest.mark.parametrize(("verdict", "words"), [("none", "These are not excluded"), ("unknown", "These come closest")])
@@ -258,9 +271,77 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     )
     runs = {"nominal": nominal, "refit": nominal, "best": best}
     found = Diagnosis("leak", 0.97, (("front_air", 0.98),), (ranked,), (), gap, {}, active, trajectories=runs)
-    written = write_outputs(tmp_path / "new", found, model, [fit], holdout)
+    written, first = write_outputs(tmp_path / "new", found, model, [fit], holdout)
     assert [path.name for path in written] == ["diagnosis.json", "report.html", "residual.mcap"]
     assert sorted((tmp_path / "new").iterdir()) == sorted(written), "nothing else: no .part, no metadata.yaml"
     page = written[1].read_text()
+    assert ("where", "the front air and valve 98 %") in first.facts
+    assert dict(first.facts)["how big"] == "leak area 0.4000 ± 0.0010 mm²"
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"
+
+
+def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
+    found = findings()
+    said = story(found.summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))
+    facts = dict(said.facts)
+    assert facts["how big"] == "leak area 0.4100 ± 0.0020 mm²"
+    first = re.match(r"[a-z ]+ ([\d.]+) → ([\d.]+) (mm|kPa);", facts["mends"])
+    assert first is not None and float(first[1]) > 50 * float(first[2]), "what the refit leaves, and what is left then"
+    assert facts["by hand"] in render(found).replace("&#39;", "'") and facts["by hand"]
+    assert facts["or else"].startswith("orifice coefficient") and "valves" in facts["or else"]
+
+
+def test_a_page_without_an_effect_paints_nothing() -> None:
+    page = render(findings("none"))
+    assert colour(1.0) not in page and colour(0.93) not in page and "#f06514" not in page.lower()
+    assert "missing inflow" not in page and "nothing to name" in page and ">sure:" not in page
+
+
+def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
+    found = findings("unknown")
+    curve = {"x": {"name": "height", "unit": "m"}, "y": {"name": "force", "unit": "N"},
+             "points": [[-0.01, -3.0, -4.0, -2.0, 1.0], [0.01, 5.0, 4.0, 6.0, 1.0]]}  # fmt: skip
+    summary = {**found.summary, "evidence": {"closes:leak": 0.31, "effects": 1.0, "walls": 2.0},
+               "remainder": {"share": 0.4, "places": ["front_force"], "curve": curve}}  # fmt: skip
+    said = story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))
+    facts = dict(said.facts)
+    assert said.confidence == "no name fits", "nobody is sure of nothing"
+    assert facts["closest"].startswith("leak (front) closes 98 % of the held-out gap")
+    assert (
+        "leak closes 31 % of that, and half is needed" in facts["not it"] and "2 of its parameters" in facts["not it"]
+    )
+    assert "force over height: -3 N at -10 mm, 5 N at 10 mm" in facts["measured"]
+
+
+def test_what_became_of_an_effect_of_ones_own_is_told() -> None:
+    known = Known(LIBRARY, own=("supply_droop", "mine", "leak"))
+    summary = {**findings().summary, "tried": [{"candidate": "leak:front", "gap_fit": 0.01},
+                                               {"candidate": "mine:rear", "gap_fit": 0.2}]}  # fmt: skip
+    fate = dict(story(summary, known).facts)["your effect"]
+    assert "supply droop was fitted and closes 98 %" in fate and "leak is the verdict" in fate
+    assert "mine was fitted and is number 2 of 2: 0.2 left" in fate
+
+
+def test_the_rigs_own_parameters_stand_beside_what_was_stated() -> None:
+    summary = {**findings().summary, "nuisance": {"pitch_inertia": {"value": 3.1, "std": 0.01, "unit": "kg m2"}}}
+    page = render(replace(findings(), summary=summary, priors={"pitch_inertia": (2.9, 0.1)}))
+    for cell in ("pitch inertia", "3.100 ± 0.010", "2.9", "0.1", "+2.0"):
+        assert f">{cell}</td>" in page
+    assert "pitch inertia 3.100 ± 0.010 kg m2 (nominal 2.9, +2.0 sigma)" in page
+
+
+@pytest.mark.parametrize("shares", [[0.604, 0.404], [0.5, 0.5, 0.5], [1 / 3] * 3, [0.996, 0.004], [0.93]])
+def test_shares_add_up_to_at_most_a_hundred(shares: list[float]) -> None:
+    whole = whole_percents(shares)
+    assert sum(whole) <= 100 and all(
+        abs(w - 100 * s / max(sum(shares), 1)) < 1 for w, s in zip(whole, shares, strict=True)
+    )
+
+
+def test_names_keep_their_letters_and_an_interval_has_two_ends() -> None:
+    assert sentence("fit.mcap: too short") == "fit.mcap: too short."
+    assert sentence("volume_slope_front stands at the edge") == "volume_slope_front stands at the edge."
+    assert sentence("an effect") == "An effect."
+    assert interval(0.96, 0.99) == " (90 % interval 96 % to 99 %)"
+    assert interval(0.981, 0.983) == " (90 % interval 98.1 % to 98.3 %)" and interval(0.98, 0.98) == ""

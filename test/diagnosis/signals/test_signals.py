@@ -396,3 +396,13 @@ def test_a_broken_config_is_said_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="out of range") as error:
         read_signals(path)
     assert "\n" not in str(error.value)
+
+
+def test_the_tips_of_a_chattering_pressure_are_no_glitches(clean: Topics) -> None:
+    """A valve that is opened and closed every other sample, for a while: as our own closed loop logs it."""
+    values = clean[REAR].channels["pressure"].copy()
+    rng = np.random.default_rng(5)
+    tips = rng.exponential(1500.0, 3000) * (rng.random(3000) < 0.1)
+    values[500:3500] += tips * np.resize((1.0, -1.0), 3000)
+    signals = prepare({**clean, REAR: with_channel(clean[REAR], "pressure", values)}, load_rig())
+    assert "glitches" not in codes(signals) and signals.weight[:, 5].all()

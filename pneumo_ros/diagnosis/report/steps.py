@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What to do with a verdict: sentences, and the commands to type from where the diagnosis was typed."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pneumo_ros.diagnosis.report.words import LIKELY, first_place, forbidden, place_words
+from pneumo_ros.diagnosis.result import ROAD_FILE, VALVE_FILE
+
+# For a place without a name: (what moves it, the road that does).
+_TELLING = {
+    "air": ("sweeps the valves' whole range on a smooth road", "--road flat --controller third_order_smc"),
+    "supply": ("draws air from both ends at once", "--road E"),
+    "force": ("moves the springs slowly and fast, by little and by much", "--road sweep"),
+    "tyre": ("goes through the wheels' hop", "--road sweep"),
+    "sensor": ("takes each sensor through its range slowly", "--road sine"),
+    "body": ("shakes heave and pitch", "--road bump"),
+    "road": ("is another road than the one that was fitted", "--road E"),
+}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user typed, so that the next command can be typed at the same place.
+
+    Attributes
+    ----------
+    fit, holdout : logs, as typed
+    output : the diagnosis' folder, as typed
+    rig : the file of --save-rig; None where none was wanted
+    options : of the diagnosis, to be repeated
+    """
+
+    fit: tuple[Path, ...] = (Path("FIT.mcap"),)
+    holdout: Path | None = None
+    output: Path = Path("DIAGNOSIS")
+    rig: Path | None = None
+    options: tuple[str, ...] = ()
+
+    def diagnosis(self, *further: Path, output: Path, options: tuple[str, ...] = ()) -> str:
+        """``pneumo diagnose`` of the same logs and further ones."""
+        held = () if self.holdout is None else ("--holdout", self.holdout)
+        words = ("pneumo", "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
+        return command(*words)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A sentence, and what to type for it, line by line; the first one is what comes next."""
+
+    text: str
+    commands: tuple[str, ...] = ()
+
+
+def command(*words: object) -> str:
+    """Words as a shell takes them."""
+    return " ".join(shlex.quote(str(word)) for word in words)
+
+
+def next_steps(summary: Mapping[str, Any], asked: Asked | None = None) -> list[Step]:
+    """What to do with the verdict, the most useful first."""
+    asked = asked or Asked()
+    if summary.get("rig_model"):
+        return _own_steps(summary, asked)
+    if summary["verdict"] == "not_testable":
+        return [_record_again(summary, asked)]
+    experiment = summary.get("next_experiment")
+    steps = [_experiment(experiment, asked)] if experiment else []
+    if summary["verdict"] == "unknown":
+        return [*steps, _look_closer(summary, asked), _idea(summary, asked)]
+    if not experiment and float(summary["probability"]) < LIKELY:
+        steps.append(_more(asked, "Log a second session on another road and fit both.", "--road E"))
+    return [*steps, _keep(summary, asked)]
+
+
+def _own_steps(summary: Mapping[str, Any], asked: Asked) -> list[Step]:
+    """For a rig of one's own, which no verb drives."""
+    verdict = str(summary["verdict"])
+    if verdict == "not_testable":
+        return [Step("Record a log that moves more, or longer.")]
+    if verdict == "unknown":
+        where = first_place(summary) or "the curves of the report"
+        return [Step(f"Look at {where}. What could be missing there is a further slot of rig.py (docs/your-rig.md).")]
+    rig = asked.rig or asked.output / "rig.yaml"
+    text = "Keep the model, with its parameters as re-estimated." if verdict == "none" else (
+        f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
+    options = () if asked.rig is not None else ("--overwrite", "--save-rig", str(rig))
+    if asked.rig is not None:
+        return [Step(f"{text} {rig} has it, for --rig of the next diagnosis.")]
+    return [Step(f"{text} A rig file has it, for --rig of the next diagnosis:",
+                 (asked.diagnosis(output=asked.output, options=options),))]  # fmt: skip
+
+
+def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
+    played = _second(asked)
+    files = {key: asked.output / name for key, name in (("--road", ROAD_FILE), ("--valves", VALVE_FILE))}
+    length = str(experiment.get("command", "")).rpartition("--duration ")[2].split(" ")[0] or "12"
+    run = command("pneumo", "run", *(word for pair in files.items() for word in pair), "--duration", length,
+                  "--output", played)  # fmt: skip
+    text = f"{str(experiment['description']).rstrip('.')} (on hardware with --source serial --port PORT)"
+    return Step(f"Split the rivals: {text}.", (run, asked.diagnosis(played, output=_another(asked.output))))
+
+
+def _second(asked: Asked) -> Path:
+    return asked.fit[0].parent / "second.mcap"
+
+
+def _another(folder: Path) -> Path:
+    return folder.with_name(f"{folder.name}-2")
+
+
+def _more(asked: Asked, text: str, options: str) -> Step:
+    played = _second(asked)
+    run = f"pneumo run {options} --duration 20 --output {shlex.quote(str(played))}"
+    return Step(text, (run, asked.diagnosis(played, output=_another(asked.output))))
+
+
+def _look_closer(summary: Mapping[str, Any], asked: Asked) -> Step:
+    """The experiment for a place without a name: what moves that place."""
+    places = [str(entry["place"]) for entry in summary.get("location") or []]
+    kind = next((kind for kind in _TELLING for place in places[:1] if kind in place), "road")
+    moves, options = _TELLING[kind]
+    where = place_words(places[0]) if places else "the rig"
+    return _more(asked, f"Log a session that {moves}: it shows more of the law at {where}.", options)
+
+
+def _idea(summary: Mapping[str, Any], asked: Asked) -> Step:
+    where = first_place(summary) or "the curves of the report"
+    text = f"Look at {where}. An idea becomes a candidate as a Python file (docs/diagnosis.md shows one)."
+    return Step(text, (asked.diagnosis(output=_another(asked.output), options=("--effect", "MY_EFFECT.py")),))
+
+
+def _keep(summary: Mapping[str, Any], asked: Asked) -> Step:
+    none = summary["verdict"] == "none"
+    rig = asked.rig or asked.output / "rig.yaml"
+    drive = command("pneumo", "run", "--rig", rig)
+    text = "Keep the model, with its parameters as re-estimated." if none else (
+        f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
+    if asked.rig is not None:
+        return Step(f"{text} {rig} has it, for --rig of every verb:", (drive,))
+    save = asked.diagnosis(output=asked.output, options=("--overwrite", "--save-rig", str(rig)))
+    return Step(f"{text} A rig file has it, for --rig of every verb:", (save, drive))
+
+
+def _record_again(summary: Mapping[str, Any], asked: Asked) -> Step:
+    if forbidden(summary):
+        return Step("Mend what is listed as a note, and record the session again.")
+    run = f"pneumo run --road E --duration 20 --output {shlex.quote(str(_second(asked)))}"
+    return Step("Record a session that moves more: a rougher road with the valves at work, 15 s or longer.", (run,))

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a reader needs first, in order, for the report's first screen and the terminal alike.
+
+What it is, where, how big, which signals it mends and by how much, how to check it by hand, what else it may be, what
+to do next; where there is no name, what came closest and why it was not taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.judge.verdict import Calibration
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
+from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
+from pneumo_ros.diagnosis.report.steps import Asked, Step, next_steps
+from pneumo_ros.diagnosis.report.words import (
+    STANDS_OUT,
+    UNNAMED,
+    confidence,
+    effect_name,
+    forbidden,
+    headline,
+    how_far,
+    percent,
+    place_words,
+    structure_words,
+    whole_percents,
+    winner,
+)
+from pneumo_ros.effects.contract import Effect
+from pneumo_ros.effects.sheet import check_words
+
+TOLD = 3  # signals, rivals and own parameters that are told first
+MOVED = 1.0  # tolerances from which a parameter of the rig is worth telling
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How far log and model are apart in one signal on the held-out log, rms, in the unit that people read."""
+
+    signal: str
+    unit: str
+    before: float
+    after: float
+    noise: float
+
+    @property
+    def words(self) -> str:
+        """``front axle 1.3 -> 0.042 mm``."""
+        return f"{self.signal} {self.before:.2g} → {self.after:.2g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Story:
+    """The first screen.
+
+    Attributes
+    ----------
+    headline, confidence : what, and how sure
+    facts : (what is told, its text), in order
+    steps : what to do next
+    """
+
+    headline: str
+    confidence: str
+    facts: tuple[tuple[str, str], ...]
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known beside the diagnosis file.
+
+    Attributes
+    ----------
+    library : id -> effect
+    gains : of :func:`gains`
+    priors : parameter of the rig -> its nominal value and standard deviation
+    own : ids of the user's own effects that competed
+    asked : what was typed
+    """
+
+    library: Mapping[str, Any]
+    gains: Sequence[Gain] = ()
+    priors: Mapping[str, tuple[float, float]] | None = None
+    own: Sequence[str] = ()
+    asked: Asked | None = None
+
+
+def gains(holdout: Any, runs: Mapping[str, Array], card: RigCard = HALF_CAR) -> list[Gain]:
+    """Of every usable signal, the one that is mended most (in its own standard deviations) first."""
+    off = {key: _rms(holdout, runs[key]) for key in ("refit", "best")}
+    order = np.argsort(-(off["refit"] - off["best"]) / holdout.scale)
+    out = []
+    for c in (int(c) for c in order if holdout.usable[c]):
+        name = list(card.titles)[c]
+        unit, factor = card.units[name]
+        values = (factor * float(x[c]) for x in (off["refit"], off["best"], holdout.noise))
+        out.append(Gain(card.titles[name], unit, *values))
+    return out
+
+
+def _rms(log: Any, run: Array) -> Array:
+    weight = np.maximum(log.weight.sum(axis=0), 1.0)
+    return np.sqrt((log.weight * (log.measured - run) ** 2).sum(axis=0) / weight)
+
+
+def story(summary: Mapping[str, Any], known: Known) -> Story:
+    """The first screen of a diagnosis.
+
+    Parameters
+    ----------
+    summary : the diagnosis file's mapping
+    """
+    verdict = str(summary["verdict"])
+    phrases = {name: effect.summary for name, effect in known.library.items()}
+    tell = _named if verdict not in UNNAMED else {"unknown": _unknown}.get(verdict, _nothing)
+    facts = [*tell(summary, known), *_own(summary, known)]
+    steps = tuple(next_steps(summary, known.asked))
+    return Story(headline(summary, phrases), confidence(summary), tuple(fact for fact in facts if fact[1]), steps)
+
+
+def _named(summary: Mapping[str, Any], known: Known) -> list[tuple[str, str]]:
+    return [
+        ("where", places(summary)),
+        ("how big", ", ".join(_sizes(summary))),
+        ("mends", _mended(known.gains)),
+        ("by hand", check(summary, known.library)),
+        ("or else", _rivals(summary, known.library)),
+        ("the rig", moved(summary, known.priors)),
+    ]
+
+
+def _nothing(summary: Mapping[str, Any], known: Known) -> list[tuple[str, str]]:
+    if summary["verdict"] == "not_testable":
+        return [] if forbidden(summary) else [("unseen", unseen(summary))]
+    return [
+        ("the gap", how_far(summary)),
+        ("off by", _off(known.gains)),
+        ("or else", _rivals(summary, known.library)),
+        ("the rig", moved(summary, known.priors)),
+        ("unseen", unseen(summary)),
+    ]
+
+
+def _unknown(summary: Mapping[str, Any], known: Known) -> list[tuple[str, str]]:
+    return [
+        ("where", places(summary)),
+        ("off by", _off(known.gains)),
+        ("closest", closest(summary)),
+        ("not it", why_not(summary)),
+        ("measured", measured(summary)),
+        ("or else", _rivals(summary, known.library)),
+    ]
+
+
+def places(summary: Mapping[str, Any]) -> str:
+    """Where it acts, with shares that add up to at most 100 %."""
+    found = [(str(e["place"]), float(e["share"])) for e in summary.get("location") or []]
+    shown = [(place, share) for place, share in found if share >= STANDS_OUT]
+    shares = whole_percents([share for _, share in shown])
+    return ", ".join(f"{place_words(place)} {share} %" for (place, _), share in zip(shown, shares, strict=True)) or (
+        "no place stands out")  # fmt: skip
+
+
+def _sizes(summary: Mapping[str, Any]) -> list[str]:
+    """Parameters that the log determines; beside a shape the law's own are often not."""
+    found = {
+        n: v for n, v in winner(summary)["parameters"].items() if float(v.get("std") or 0.0) < abs(float(v["value"]))
+    }
+    words = [f"{name.replace('_', ' ')} {quantity_words(name, value)}" for name, value in found.items()]
+    return words or ["no single number: the law as measured is in the report"]
+
+
+def _mended(found: Sequence[Gain]) -> str:
+    """The signals that gain most."""
+    shown = [one for one in found if one.after < one.before][:TOLD]
+    if not shown:
+        return ""
+    return "; ".join(one.words for one in shown) + " (rms on the held-out log, against parameters re-estimated)"
+
+
+def _off(found: Sequence[Gain]) -> str:
+    shown = sorted(found, key=lambda one: -one.before / max(one.noise, 1e-12))[:TOLD]
+    words = [f"{one.signal} {one.before:.2g} {one.unit} (noise {one.noise:.2g})" for one in shown]
+    return "; ".join(words) + ", rms on the held-out log" if words else ""
+
+
+def check(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
+    """The check by hand of each effect of the verdict, with the values that were found."""
+    entry = winner(summary)
+    several = len(entry["effects"]) > 1
+    out = []
+    for name in entry["effects"]:
+        effect = library.get(name)
+        if effect is None:
+            continue
+        values = {p.name: _value(entry["parameters"], name, p.name) for p in effect.parameters}
+        words = check_words(effect, {key: value for key, value in values.items() if value is not None})
+        out += [f"{effect_name(name)}: {words}" if several else words] if words else []
+    return "; ".join(out)
+
+
+def _value(parameters: Mapping[str, Any], effect: str, name: str) -> float | None:
+    """Of a parameter, whose key carries its effect's id where two effects share the name."""
+    found = parameters.get(name) or next((v for k, v in parameters.items() if effect in k and k.endswith(name)), None)
+    return None if found is None else float(found["value"])
+
+
+def _rivals(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
+    """What else is possible, each with its probability and how it differs by hand."""
+    own = str(summary["verdict"]).split("+")
+    names = [name for name in summary.get("ambiguity_group") or [] if name != summary["verdict"]]
+    out = []
+    for name in names[:TOLD]:
+        entry = next((e for e in summary["ranking"] if "+".join(e["effects"]) == name), None)
+        words = effect_name(name).replace("+", " and ")
+        words += f" ({percent(float(entry['probability']))})" if entry and float(entry["probability"]) >= 0.005 else ""
+        differs = next((_difference(library, one, name) for one in own if _difference(library, one, name)), "")
+        out.append(f"{words}: {differs}" if differs else words)
+    return "; ".join(out)
+
+
+def _difference(library: Mapping[str, Effect], one: str, other: str) -> str:
+    """What tells ``other`` from ``one``, as the guide of either has it."""
+    for first, second in ((one, other), (other, one)):
+        effect = library.get(first)
+        if effect is not None and effect.guide is not None and second in effect.guide.mistaken_for:
+            told = effect.guide.mistaken_for[second]
+            return told if second == other else f"where {effect_name(one)} {told}"
+    return ""
+
+
+def moved(summary: Mapping[str, Any], priors: Mapping[str, tuple[float, float]] | None) -> str:
+    """The rig's own parameters that moved most, beside their nominal values."""
+    rows = [row for row in own_parameters(summary, priors or {}) if abs(row["sigmas"]) >= MOVED]
+    rows.sort(key=lambda row: -abs(row["sigmas"]))
+    words = [f"{r['name']} {r['value']} {r['unit']}".rstrip() + f" (nominal {r['nominal']}, {r['sigmas']:+.1f} sigma)"
+             for r in rows[:TOLD]]  # fmt: skip
+    return "; ".join(words)
+
+
+def own_parameters(summary: Mapping[str, Any], priors: Mapping[str, tuple[float, float]]) -> list[dict[str, Any]]:
+    """Each parameter of the rig: name, value with its uncertainty, nominal, tolerance, tolerances moved, unit."""
+    return [
+        quantity_row(name, quantity, priors.get(name)) for name, quantity in (summary.get("nuisance") or {}).items()
+    ]
+
+
+def closest(summary: Mapping[str, Any]) -> str:
+    """The structure that comes closest without a name being earned, and what it closes."""
+    entry = nearest(summary)
+    if entry is None:
+        return "no listed effect closes anything"
+    left = float(summary["gap"]["refit"])
+    return (f"{structure_words(entry)} closes {percent(max(float(entry['shrink']), 0.0))} of the held-out gap that "
+            f"re-estimated parameters leave ({left:.2g} → {float(entry['gap_after']):.2g})")  # fmt: skip
+
+
+def nearest(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The named entry of the ranking that leaves least of the held-out gap."""
+    named = [e for e in summary.get("ranking") or [] if set(e["effects"]).isdisjoint(UNNAMED)]
+    return min(named, key=lambda e: float(e["gap_after"]), default=None)
+
+
+def why_not(summary: Mapping[str, Any]) -> str:
+    """Why the closest structure was not accepted."""
+    evidence, limits = summary.get("evidence") or {}, Calibration()
+    entry = nearest(summary)
+    if entry is None:
+        return ""
+    reasons = []
+    for effect in entry["effects"]:
+        share = evidence.get(f"closes:{effect}")
+        if share is not None and float(share) < limits.closes:
+            reasons.append(f"whatever may act at its place closes more: {effect_name(effect)} closes "
+                           f"{percent(float(share))} of that, and half is needed")  # fmt: skip
+    if float(evidence.get("walls") or 0.0) >= limits.walls:
+        reasons.append(f"{float(evidence['walls']):.0f} of its parameters stop at the ends of their ranges")
+    if float(entry["shrink"]) <= 0.0:
+        reasons.append("it does not shrink the held-out gap")
+    if float(evidence.get("effects") or 0.0) == 0.0:
+        reasons.append("on the blocks kept from the fit no effect helps more than chance does")
+    reasons += [str(note) for note in entry.get("notes") or ()]
+    return "; ".join(reasons) or "what it leaves is more than a right law would"
+
+
+def measured(summary: Mapping[str, Any]) -> str:
+    """What was measured of the law that has no name."""
+    rest = summary.get("remainder") or {}
+    curve = rest.get("curve")
+    if not curve:
+        return ""
+    points = np.asarray(curve["points"], dtype=float)[:, :2]
+    x, y = curve["x"], curve["y"]
+    (along, x_factor), (up, y_factor) = (readable(axis["unit"], points[:, k]) for k, axis in enumerate((x, y)))
+    at = " and ".join(place_words(place) for place in rest["places"])
+    low, high = points[0] * (x_factor, y_factor), points[-1] * (x_factor, y_factor)
+    return (f"at {at}, {y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
+            f"{high[1]:.3g} {up} at {high[0]:.3g} {along}; its curve is in the report")  # fmt: skip
+
+
+def unseen(summary: Mapping[str, Any]) -> str:
+    """Effects that the excitation could not have shown."""
+    return ", ".join(effect_name(name) for name in summary.get("not_testable") or {})
+
+
+def _own(summary: Mapping[str, Any], known: Known) -> list[tuple[str, str]]:
+    """What became of the user's own effects."""
+    return [("your effect", "; ".join(fate(summary, name) for name in known.own))] if known.own else []
+
+
+def fate(summary: Mapping[str, Any], name: str) -> str:
+    """What became of an effect that competed."""
+    if name in str(summary["verdict"]).split("+"):
+        return f"{name} is the verdict"
+    entries = [e for e in summary.get("ranking") or [] if name in e["effects"]]
+    if entries:
+        best = min(entries, key=lambda e: float(e["gap_after"]))
+        return (f"{structure_words(best)} was fitted and closes {percent(max(float(best['shrink']), 0.0))} of the "
+                f"held-out gap, probability {percent(float(best['probability']))}")  # fmt: skip
+    if name in (summary.get("not_testable") or {}):
+        return f"{name} could not have shown: {summary['not_testable'][name]}"
+    tried = [t for t in summary.get("tried") or [] if str(t["candidate"]).split(":")[0] == name]
+    if tried:
+        order = [str(t["candidate"]) for t in summary["tried"]]
+        number = order.index(str(tried[0]["candidate"])) + 1
+        return f"{name} was fitted and is number {number} of {len(order)}: {float(tried[0]['gap_fit']):.3g} left"
+    return f"{name} promised too little in the first trial to be fitted"

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The next experiment: what it plays can be played, and one that would tell nothing is not offered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.own_logs import QUICK, drawn, log
+
+from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, design_experiment
+from pneumo_ros.diagnosis.result import SEPARATES, Experiment
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.rig import load_rig
+
+KEPT = ("leak", "orifice_coefficient", "valve_lag")
+
+
+@pytest.fixture(scope="module")
+def model() -> RigModel:
+    whole = RigModel(load_rig())
+    return RigModel(load_rig(), whole.library, frozenset(whole.library) - set(KEPT))
+
+
+def fitted(problem: Problem, effect: str, *values: float) -> Fit:
+    candidate = Candidate(((effect, "front"),))
+    return fit(problem, candidate, problem.start(candidate, None, values), iterations=4)
+
+
+def test_some_profiles_move_the_outlets_and_all_of_them_can_be_played() -> None:
+    t = np.arange(round(DURATION / PERIOD)) * PERIOD
+    shapes = {profile.name: profile.valves(t) for profile in PROFILES}
+    assert all(valves.shape == (len(t), 4) and valves.min() >= 0.0 for valves in shapes.values())
+    outlets = {name: set(np.unique(valves[:, 2:]).tolist()) for name, valves in shapes.items()}
+    assert outlets["valves-closed"] == {0.0, 1.0} and outlets["valves-half"] == {0.5, 1.0}
+    assert outlets["outlet-pulses"] == {0.0, 1.0}
+    assert all(profile.road(t).shape == (len(t), 2) for profile in PROFILES)
+
+
+def test_a_leak_and_an_orifice_are_driven_apart_with_the_valves_closed(model: RigModel) -> None:
+    """A leak flows through closed valves as well: no profile with open outlets shows that."""
+    problem = Problem(model, (log(model, 1, drawn(model, 4, 0.5), (Active("leak", "front", (4e-7, 0.6)),)),))
+    leak, orifice = fitted(problem, "leak", 4e-7, 0.6), fitted(problem, "orifice_coefficient", 0.2, 0.0, 1.0)
+    found = design_experiment(problem, leak, orifice)
+    assert found is not None and found.tells and found.chosen_from == len(PROFILES)
+    assert not np.array_equal(found.valves[:, 2], np.full(len(found.valves), found.valves[0, 2])), found.name
+
+
+@pytest.mark.parametrize("separation", [0.02, 1.99, 2.0])
+def test_what_would_tell_nothing_is_not_offered(
+    model: RigModel, separation: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rivals are given; the log's own would take minutes."""
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.ambiguity_group", lambda *_: ("leak", "orifice_coefficient"))
+    effect = (Active("leak", "front", (4e-7, 0.6)),)
+    logs = [log(model, seed, drawn(model, 4, 0.5), effect) for seed in (1, 2)]
+    nothing = np.zeros((2, 4))
+    fake = Experiment("flat", "a flat road", separation, 0.0, np.array([0.0, 0.1]), nothing[:, :2], nothing, 10)
+    options = Options(pairs=False, effort=replace(QUICK, finalists=4), experiment=lambda *_: fake)
+    found = diagnose(model, logs[:1], logs[1], options)
+    notes = [note for note in found.notes if "no experiment is offered" in note]
+    assert (found.experiment is not None) == (separation >= SEPARATES) == (not notes)
+    assert all("of 10 road and valve profiles" in note and "by hand" in note for note in notes)
