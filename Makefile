@@ -8,7 +8,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint types unit colcon floors headers bench docs blind blind-ci lock clean help
+.PHONY: demo test lint types unit colcon floors headers bench docs real blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
@@ -93,6 +93,11 @@ blind-ci: $(READY)  ## Six blind cases, made and diagnosed anew, that must keep 
 	$(BIN)/pneumo blind make $(BLIND)-ci --set ci --workers $(WORKERS)
 	$(BIN)/pneumo blind diagnose $(BLIND)-ci --workers $(WORKERS)
 	$(BIN)/pneumo blind score $(BLIND)-ci --expect test/data/blind-ci.json
+
+REAL ?= ../shared/data/real
+
+real: $(READY)  ## Other people's measurements in the folder REAL, diagnosed three times each
+	$(BIN)/python bench/real_rigs.py $(REAL)
 
 docs: $(READY)  ## Write the generated tables of docs/ anew
 	$(BIN)/python -m pneumo_ros.cli.reference

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros.cli.app import App
+from pneumo_ros.cli.diagnose_against import check_against, fitted_half_car
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
@@ -63,6 +65,17 @@ def diagnose(
             help="Write the corrected rig with its effects (YAML) here, for --rig of run, emulate, replay and diagnose."
         ),
     ] = None,
+    rig_model: Annotated[
+        Path | None,
+        typer.Option(
+            help="A rig of your own: its physics (rig.py, with rig.yaml beside it, or --rig). Logs may then be tables: "
+            "CSV, Parquet, .mat (docs/your-rig.md)."
+        ),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="An earlier log: it fits the rig, and FIT is diagnosed against that rig. What has changed?"),
+    ] = None,
     pairs: Annotated[bool, typer.Option(help="Look for two effects at once as well.")] = True,
     overwrite: Overwrite = False,
     tables: Annotated[
@@ -86,6 +99,15 @@ def diagnose(
     if not fit or output is None:
         missing = "no log to fit" if not fit else "no folder for the diagnosis"
         raise InputError(missing, where="pneumo diagnose", remedy="pneumo diagnose FIT.mcap --output FOLDER")
+    check_against(against)
+    if rig_model is not None:
+        from pneumo_ros.cli.diagnose_own import diagnose_own
+
+        if edit is not None or effect:
+            key, given = ("--effect", effect[0]) if effect else ("--edit", edit)
+            raise InputError("is the half car's own", where=given, key=key, remedy="leave it away with --rig-model")
+        diagnose_own(console, rig_model, fit, holdout, output, rig, without or (), save_rig, against, pairs, overwrite)
+        return
     _check_files(fit, holdout, edit, rig, effect)
     refuse_old_diagnosis(output, save_rig, overwrite, [rig] if rig is not None else [])
     from pneumo_ros.diagnosis.diagnose import Options
@@ -103,9 +125,12 @@ def diagnose(
     own = None if rig is None else load_rig(rig)
     if own is not None:
         tell_assumed(console, own, rig)
-    task = prepared(fit, holdout, own, edit, effect or (), without or ())
+    with ExitStack() as held:
+        if against is not None:
+            own = held.enter_context(fitted_half_car(console, against, own, effect or (), pairs))
+        task = prepared(fit, holdout, own, edit, effect or (), without or ())
     options = Options(pairs=pairs, experiment=design_experiment, threads=os.cpu_count() or 1)
-    with _bar(console) as progress:
+    with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
     asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without))
@@ -114,7 +139,7 @@ def diagnose(
         files += found.experiment.write(output)
     if save_rig is not None:
         files.append(save_corrected_rig(found, task.model, save_rig))
-    _show(console, found, first)
+    show(console, found, first)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
 
 
@@ -139,7 +164,7 @@ def _check_files(
             raise InputError("no such file", where=file, key=key, remedy="check the name")
 
 
-def _show(console: Console, found: Diagnosis, first: Story) -> None:
+def show(console: Console, found: Diagnosis, first: Story) -> None:
     """What the report says first; then the budget, the head of the ranking, the notes, and what to do next."""
     from pneumo_ros.cli.tables import fact_table
 
@@ -195,7 +220,8 @@ def _show_edit(console: Console, edit: EditTest) -> None:
     )
 
 
-def _bar(console: Console) -> Progress:
+def progress_bar(console: Console) -> Progress:
+    """How far the diagnosis is."""
     return Progress(
         TextColumn("{task.description:42.42}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=console
     )

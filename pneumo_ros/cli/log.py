@@ -45,6 +45,27 @@ _SHOWN_AS = {  # SI unit -> factor and the unit whose numbers are short
 }  # fmt: skip
 
 
+@app.command("map")
+def propose_map(
+    log: Annotated[Path, typer.Argument(help="A log of any rig: .mcap, a bag folder, .csv, .parquet, .mat.")],
+    output: Annotated[Path | None, typer.Option(help="Write the proposal here instead of printing it.")] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Propose a rig file (rig.yaml) for a rig of your own from what is in a log: every number that moves."""
+    from pneumo_ros.cli.existing import refuse_existing
+    from pneumo_ros.files import new_file
+    from pneumo_ros.own_rig.propose import proposal
+
+    text = proposal(log)
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    refuse_existing([output], overwrite)
+    with new_file(output) as part:
+        part.write_text(text, encoding="utf-8")
+    console.print(f"written: {output}", highlight=False, soft_wrap=True)
+
+
 @app.command()
 def info(log: LogPath, as_json: AsJson = False) -> None:
     """What a log holds: topics, rates, gaps, jitter, clock jumps, rig, parameters, versions, events."""

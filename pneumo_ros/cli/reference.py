@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write what is made from tables: docs/topics.md, docs/parameters.md, config/layouts/ and urdf/.
+"""Write what is made from tables: docs/topics.md, docs/parameters.md, docs/families.md, config/layouts/ and urdf/.
 
 `make docs` runs it; tests hold the files up to date.
 """
@@ -16,11 +16,21 @@ from pneumo_ros.effects.sheet import effects_page
 from pneumo_ros.parameters import Parameter
 from pneumo_ros.rig import load_rig
 from pneumo_ros.rig.urdf import urdf
+from pneumo_ros.slots.sheet import families_page
 
 EFFECTS_HEAD = """# Effects
 
 Made from the files of `pneumo_ros/effects/library` by `make docs`: what a diagnosis can name, and how an engineer at
 the rig checks it by hand. `pneumo effects ID` shows the same on the terminal.
+
+"""
+FAMILIES_HEAD = """# What may be missing, by kind of slot
+
+Made from the registry (`pneumo_ros/slots/laws.py` and `shapes.py`) by `make docs`: the families that a rig of
+your own ([your-rig.md](your-rig.md)) may be diagnosed with. A family is a mechanism; its laws compete, its shape is a
+sum of simple atoms of one sign that any law of the kind lies in, and "whatever may act there" uses every atom of the
+slot with either sign: the ceiling that a name is measured against ([diagnosis.md](diagnosis.md)). Sizes are looked for
+in multiples of what the log shows of the slot; units are the slot's own.
 
 """
 PARAMETERS_HEAD = """# Parameters
@@ -48,6 +58,7 @@ def documents() -> dict[str, str]:
     page = EFFECTS_HEAD + effects_page(laws_of(load_library()))
     return {
         "effects.md": page,
+        "families.md": FAMILIES_HEAD + families_page(),
         "topics.md": topics_page(),
         "parameters.md": PARAMETERS_HEAD + "\n".join(parts),
     }

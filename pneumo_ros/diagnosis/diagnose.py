@@ -29,11 +29,13 @@ from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
+from pneumo_ros.errors import InputError
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
 LIKELY = 0.05  # share of a place from which a remainder is looked for there
 SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
 MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
+FEWEST = 16  # rows of a record
 SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
 
 
@@ -80,6 +82,7 @@ def diagnose(
     progress : called with the share done and what is being done
     edit : a record of the rig after a known change, predicted without refitting
     """
+    _check_records(model, [*fit_logs, holdout])
     options = options or Options()
     tell = progress or (lambda share, what: None)
     contest = compete(Problem(model, tuple(fit_logs), threads=options.threads), options.effort, options.pairs, tell)
@@ -91,6 +94,26 @@ def diagnose(
     if opinion.verdict == "none":  # what nothing speaks for is not told, and not saved
         outcome = _without_effects(outcome)
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
+
+
+def _check_records(model: Model, records: Sequence[Any]) -> None:
+    """Refuse records of another shape than the model's, before anything is fitted to them.
+
+    Raises
+    ------
+    InputError
+        naming the record.
+    """
+    for one in records:
+        shape, wanted = np.shape(one.measured), len(model.channels)
+        if len(shape) != 2 or shape[1] != wanted or np.shape(one.weight) != shape:
+            raise InputError("measured is no table of the model's channels", where=one.name, value=shape,
+                             allowed=f"(N, {wanted}), and weight the same")  # fmt: skip
+        if shape[0] < FEWEST:
+            raise InputError("too few rows", where=one.name, value=shape[0], allowed=f"at least {FEWEST}")
+        if not np.all(np.isfinite(one.measured)):
+            raise InputError("measured is not everywhere a number", where=one.name,
+                             remedy="fill the gaps and give them no weight")  # fmt: skip
 
 
 def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Outcome:

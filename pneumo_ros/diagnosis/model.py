@@ -29,6 +29,12 @@ class EffectLike(Protocol):
     def parameters(self) -> tuple[EffectParameter, ...]: ...
 
 
+def parameters_at(effect: EffectLike, site: str) -> tuple[EffectParameter, ...]:
+    """Parameters of an effect where it acts: their units and usual sizes may differ from site to site."""
+    own: Mapping[str, tuple[EffectParameter, ...]] = getattr(effect, "by_site", {})
+    return own.get(site, effect.parameters)
+
+
 @dataclass(frozen=True)
 class PlainEffect:
     """An effect of a rig whose model knows by itself what to do with it: name, where it may act, parameters."""

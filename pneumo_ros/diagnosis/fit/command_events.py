@@ -17,7 +17,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import CORRELATION, Fit, bounded_newton, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit
 
 PRIOR_STD = 0.5  # samples: a lead costs something, so that jumps nothing depends on stay where the log has them
 # The mean square must fall below this share, or the log's own times stand: jumps that really led take most of what a
@@ -86,7 +86,7 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
     A = np.concatenate([T, J], axis=1)
     prior = np.concatenate([np.full(T.shape[1], PRIOR_STD**-2), np.full(J.shape[1], 1.0)])
     prior[T.shape[1] + problem.fixed :] = 1e-9
-    strength = 1.0 / (CORRELATION * max(1.0, float(np.mean(best.residual**2))))
+    strength = 1.0 / (problem.pace.correlation * max(1.0, float(np.mean(best.residual**2))))
     H = strength * A.T @ A + np.diag(prior)
     g = strength * A.T @ best.residual.ravel()
     low = np.concatenate([np.zeros(T.shape[1]), np.full(J.shape[1], -np.inf)])

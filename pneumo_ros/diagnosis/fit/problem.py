@@ -17,15 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
-from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.fit.pace import Pace, shared_pace
+from pneumo_ros.diagnosis.model import Model, parameters_at
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
-AVERAGED = 5  # log samples averaged into one fit sample: keeps 50 Hz at a 500 Hz log, and a fifth of the algebra
 MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
 COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
 REACH = 3.0  # prior sigmas that a nuisance parameter may move
 INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
-BLOCK = 1.25  # s, length of a time block
 SELECT_EVERY = 3  # of so many blocks in turn, one is kept from the fit and used for selection
 
 Part = tuple[str, str]  # effect id, site
@@ -63,14 +62,14 @@ class Problem:
     ----------
     model : a :class:`~pneumo_ros.diagnosis.model.Model`
     records : logs to fit
-    averaged : log samples in one fit sample
+    own_average : log samples in one fit sample; None: what the logs' own pace says
     turn : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
     """
 
     model: Model
     records: tuple[Any, ...]
-    averaged: int = AVERAGED
+    own_average: int | None = None
     turn: int = SELECT_EVERY - 1
     threads: int = 1
     _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -78,6 +77,17 @@ class Problem:
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
         """``work`` done on each item, in their order, several at a time."""
         return list(_pool(self.threads).map(work, items)) if self.threads > 1 else [work(item) for item in items]
+
+    @cached_property
+    def pace(self) -> Pace:
+        """Lengths that these logs are measured by."""
+        return shared_pace(self.records)
+
+    @cached_property
+    def averaged(self) -> int:
+        """Log samples in one fit sample: of the half car five keep 50 Hz at 500 Hz, and a fifth of the algebra."""
+        shortest = min(len(r.measured) for r in self.records)
+        return max(1, min(self.own_average or self.pace.averaged, shortest))
 
     @cached_property
     def states(self) -> int:
@@ -106,9 +116,14 @@ class Problem:
 
     @cached_property
     def noise(self) -> Array:
-        """(n, C) standard deviation of the sensor noise after averaging."""
-        pairs = zip(self.records, self._real, strict=True)
-        return np.vstack([np.asarray(r.noise) / np.sqrt(np.maximum(real.sum(axis=1), 1.0)) for r, real in pairs])
+        """(n, C) standard deviation of the sensor noise after averaging; what of it wanders does not average out."""
+        out = []
+        for r, real in zip(self.records, self._real, strict=True):
+            noise, slow = np.asarray(r.noise), np.asarray(getattr(r, "slow_noise", 0.0))
+            white = np.sqrt(np.maximum(noise**2 - slow**2, 0.0)) if np.any(slow) else noise
+            fast = white / np.sqrt(np.maximum(real.sum(axis=1), 1.0))
+            out.append(np.hypot(fast, slow) if np.any(slow) else fast)
+        return np.vstack(out)
 
     @cached_property
     def _real(self) -> list[Array]:
@@ -139,7 +154,7 @@ class Problem:
         blocks, first = [], 0
         for r in self.records:
             time = np.arange(len(r.measured) // self.averaged) * self.averaged * r.period
-            count = max(1, round(float(time[-1] + self.averaged * r.period) / BLOCK))
+            count = max(1, round(float(time[-1] + self.averaged * r.period) / self.pace.block))
             index = np.minimum((time / (time[-1] + 1e-12) * count).astype(np.int64), count - 1)
             blocks.append(first + index)
             first += count
@@ -152,13 +167,13 @@ class Problem:
 
     def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
         """Parameters of all its effects, in order."""
-        return tuple(p for effect, _ in candidate.parts for p in self.model.effects[effect].parameters)
+        return tuple(p for effect, site in candidate.parts for p in parameters_at(self.model.effects[effect], site))
 
     def active(self, candidate: Candidate, values: Array) -> tuple[Active, ...]:
         """Its effects with values (SI)."""
         out, first = [], 0
         for effect, site in candidate.parts:
-            count = len(self.model.effects[effect].parameters)
+            count = len(parameters_at(self.model.effects[effect], site))
             out.append(Active(effect, site, tuple(float(v) for v in values[first : first + count])))
             first += count
         return tuple(out)

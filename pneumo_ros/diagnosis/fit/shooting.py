@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import BLOCK, SELECT_EVERY, Candidate, Problem
+from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Record
 
@@ -36,7 +36,7 @@ def astray(problem: Problem, state: Fit) -> bool:
 
 def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, iterations: int) -> Fit | None:
     """A free-run fit that starts from what windows of the fitted blocks say; None if they cannot be cut or diverge."""
-    pieces = [piece for record in problem.records for piece in _windows(record, problem.turn)]
+    pieces = [piece for record in problem.records for piece in _windows(record, problem.turn, problem.pace.block)]
     if not pieces:
         return None
     short = Problem(problem.model, tuple(pieces), problem.averaged)
@@ -50,12 +50,12 @@ def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, itera
     return fit(problem, candidate, begin, iterations=iterations)
 
 
-def _windows(record: Any, turn: int) -> list[Any]:
+def _windows(record: Any, turn: int, block: float) -> list[Any]:
     """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
     if not isinstance(record, Sliceable):
         return []
     rows = len(record.measured)
-    count = max(1, round(rows * record.period / BLOCK))
+    count = max(1, round(rows * record.period / block))
     edges = np.linspace(0, rows, WINDOWS * count + 1).astype(int)
     seen = [k for k in range(WINDOWS * count) if (k // WINDOWS) % SELECT_EVERY != turn]
     return [record.slice(int(edges[k]), int(edges[k + 1])) for k in seen]

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 
-CORRELATION = 10.0  # fit samples that count as one: free-run residuals of a wrong structure are smooth
 HUBER = 4.0  # robust sigmas
 STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
 CENTRAL = 2e-3  # half width of the central differences
@@ -57,15 +57,20 @@ class Fit:
         return not np.isfinite(self.cost)
 
 
-def cost_of(residual: Array, rows: Mask | slice, x: Array, prior: Array) -> float:
-    """N_eff log(robust mean square) + prior; inf for a diverged prediction."""
+def cost_of(
+    residual: Array, rows: Mask | slice, x: Array, prior: Array, correlation: float = HALF_CAR.correlation
+) -> float:
+    """N_eff log(robust mean square) + prior; inf for a diverged prediction.
+
+    ``correlation`` : fit samples that count as one; free-run residuals of a wrong structure are smooth
+    """
     r = residual[rows]
     if not np.all(np.isfinite(r)):
         return np.inf
     limit = HUBER * robust_scale(r)
     magnitude = np.abs(r)
     rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
-    return float(r.size / CORRELATION * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
+    return float(r.size / correlation * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
 
 
 def robust_scale(residual: Array) -> float:
@@ -139,7 +144,14 @@ def secant(columns: Array, moved: Array, change: Array) -> Array:
 
 def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spent: int = 0) -> Fit:
     residual = problem.residual(candidate, x)
-    return Fit(candidate, x, cost_of(residual, rows, x, problem.prior(candidate)), residual, None, spent + 1)
+    return Fit(
+        candidate,
+        x,
+        cost_of(residual, rows, x, problem.prior(candidate), problem.pace.correlation),
+        residual,
+        None,
+        spent + 1,
+    )
 
 
 def _spent(columns: Array, borrowed: Array | None) -> int:
@@ -217,7 +229,7 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     magnitude = np.abs(r)
     w = np.minimum(1.0, limit / np.maximum(magnitude, 1e-12))
     rho = np.where(w < 1.0, limit * (2.0 * magnitude - limit), r * r)
-    strength = 1.0 / (CORRELATION * (COST_FLOOR + rho.mean()))
+    strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + rho.mean()))
     root = np.sqrt(w)
     A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
     prior = problem.prior(state.candidate)

@@ -10,6 +10,7 @@ import numpy as np
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
 from pneumo_ros.effects.parameters import EffectParameter
 
@@ -59,7 +60,9 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
     """Effect parameters, SI; a name that two effects share is prefixed with the effect's id."""
     assert fit.jacobian is not None
     parameters = problem.effect_parameters(fit.candidate)
-    owners = [effect for effect, _ in fit.candidate.parts for _ in problem.model.effects[effect].parameters]
+    owners = [
+        effect for effect, site in fit.candidate.parts for _ in parameters_at(problem.model.effects[effect], site)
+    ]
     names = [p.name for p in parameters]
     free = _free(problem, fit)
     out = {}
@@ -81,8 +84,8 @@ def _derived(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
     """What an effect's parameters give together, its variance by linear propagation."""
     out: dict[str, Estimate] = {}
     first = problem.fixed
-    for effect, _ in fit.candidate.parts:
-        parameters = problem.model.effects[effect].parameters
+    for effect, site in fit.candidate.parts:
+        parameters = parameters_at(problem.model.effects[effect], site)
         scale = np.array([p.typical for p in parameters])
         block = slice(first, first + len(parameters))
         values, own = fit.x[block] * scale, cov[block, block] * np.outer(scale, scale)

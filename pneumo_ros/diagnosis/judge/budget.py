@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
-from pneumo_ros.diagnosis.fit.solver import CORRELATION, COST_FLOOR, Fit, bounded_newton
+from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit, bounded_newton
 from pneumo_ros.diagnosis.judge.held_out import free_run
 from pneumo_ros.diagnosis.search.growth import restricted
 from pneumo_ros.effects.parameters import Active, family_of
 
-BLOCK = 1.0  # s of the moving blocks of the interval
 DRAWS = 200
 WILD = 1e6  # squared error of a run that diverged
 
@@ -128,7 +128,7 @@ class _Answer:
         residual = problem.residual(candidate, restricted(problem, best, candidate)).ravel()
         if not np.all(np.isfinite(residual)):
             return problem.nuisance(best.x)
-        strength = 1.0 / (CORRELATION * (COST_FLOOR + float(np.mean(residual**2))))
+        strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + float(np.mean(residual**2))))
         x, low, high = best.x[: problem.fixed], *(b[: problem.fixed] for b in problem.bounds(Candidate()))
         step = bounded_newton(strength * self.gram + np.eye(problem.fixed), strength * self.columns.T @ residual + x,
                               low - x, high - x)  # fmt: skip
@@ -156,7 +156,7 @@ def _drawn(count: int, squares: dict[frozenset[int], Array], holdout: Any) -> li
     if not shares:
         return []
     rows = len(shares[0])
-    length = max(1, min(rows, round(BLOCK / holdout.period)))
+    length = max(1, min(rows, round(pace_of(holdout).wander / holdout.period)))
     starts = np.random.default_rng(1).integers(0, rows - length + 1, size=(DRAWS, max(1, rows // length)))
     sums = [np.concatenate([[0.0], np.cumsum(share)]) for share in shares]
     return [(c[starts + length] - c[starts]).sum(axis=1) / (starts.shape[1] * length) for c in sums]

@@ -23,6 +23,7 @@ from pneumo_ros.diagnosis.search.growth import of_law, reduced, with_parts
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS = 4  # iterations of a fit with something added or taken away
+SLACK = 0.03  # of what there was to close: what a law of the right kind may leave without a word
 TOGETHER = 3  # places at which a remainder is looked for together
 
 
@@ -38,6 +39,7 @@ class EffectEvidence:
     own : gap left by the structure
     ceiling : gap left when whatever may act at its places is added
     share : what it holds of what the refit leaves
+    floor : what sensors and the stated model form leave anyway; 0 where no form is stated
     at_bounds : how many of its parameters stand at a bound that is no natural end of its law
     """
 
@@ -48,6 +50,7 @@ class EffectEvidence:
     ceiling: float
     share: float = 1.0
     at_bounds: float = 0.0
+    floor: float = 0.0
 
     @property
     def family(self) -> str:
@@ -59,6 +62,17 @@ class EffectEvidence:
         """Share, rms, of what can be closed at its places that its family closes; 0..1."""
         whole = np.sqrt(self.without) - np.sqrt(min(self.ceiling, self.own))
         return float(np.clip((np.sqrt(self.without) - np.sqrt(self.own)) / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+
+    @property
+    def leaves(self) -> float:
+        """What its family leaves, rms, over what anything at its places leaves; 1 where no model form is stated.
+
+        :data:`SLACK` of what there was to close counts as nothing.
+        """
+        if self.floor <= 0.0:
+            return 1.0
+        own, best = (float(np.sqrt(one + self.floor**2)) for one in (self.own, min(self.ceiling, self.own)))
+        return own / max(best + SLACK * float(np.sqrt(self.without)), 1e-12)
 
 
 @dataclass(frozen=True)
@@ -99,6 +113,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     places : further places of the contract where something may be missing, the likeliest first
     """
     own = above(problem, best, holdout, floor)
+    stated = floor if getattr(holdout, "model_form", 0.0) > 0.0 else 0.0
     remainders: dict[tuple[str, ...], Remainder] = {}
 
     def added(where: tuple[str, ...]) -> Remainder:
@@ -112,7 +127,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         without = above(problem, bare, holdout, floor)
         walls = at_bounds(problem, best, of_law(best.candidate, law))
-        evidence.append(EffectEvidence(law, where, without, own, added(where).left, at_bounds=walls))
+        evidence.append(EffectEvidence(law, where, without, own, added(where).left, at_bounds=walls, floor=stated))
     if places:  # together, what is left may need them all; alone, one of them may do
         added(tuple(places[:TOGETHER]))
         added((places[0],))

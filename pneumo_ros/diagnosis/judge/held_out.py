@@ -9,26 +9,25 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.fit.problem import INITIAL_WIDENING, scale_of
 from pneumo_ros.diagnosis.fit.solver import bounded_newton
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.effects.parameters import Active
 
-BOOTSTRAP_BLOCK = 1.0  # s: longer than the slowest oscillation of a residual
-SETTLE = 0.2  # s at the start of a held-out log from which its initial state is estimated
-
 
 def free_run(model: Model, record: Any, nuisance: Array, active: Sequence[Active]) -> Array:
     """Prediction of a held-out log from its measured initial state, (N, C).
 
-    The state at the first row is refined on the first :data:`SETTLE` s alone (sensors have noise); parameters stay.
+    The state at the first row is refined on the first moments alone (``settle`` of its pace): sensors have noise.
+    Parameters stay.
     """
     return model.predict(record, nuisance, settle(model, record, nuisance, active), active)
 
 
 def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active], rounds: int = 2) -> Array:
     """Initial state (S,): measured, refined by least squares over the first moments within its own uncertainty."""
-    rows = min(len(record.measured), max(8, round(SETTLE / record.period)))
+    rows = min(len(record.measured), max(8, round(pace_of(record).settle / record.period)))
     state, std = model.initial(record, active)
     std = INITIAL_WIDENING * std
     centre, sigma = state.copy(), np.maximum(record.noise, 1e-3 * scale_of(record))
@@ -80,7 +79,7 @@ def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, s
     squares = [np.sum(np.where(there, (record.measured - y) / scale, 0.0) ** 2, axis=1) for y in (refit, best)]
     if not all(np.all(np.isfinite(s)) for s in squares):
         return (-np.inf, 0.0)
-    length = max(1, round(BOOTSTRAP_BLOCK / record.period))
+    length = max(1, round(pace_of(record).wander / record.period))
     sums = [np.convolve(np.concatenate([s, s[: length - 1]]), np.ones(length), mode="valid") for s in squares]
     rng = np.random.default_rng(seed)
     count = max(1, len(squares[0]) // length)

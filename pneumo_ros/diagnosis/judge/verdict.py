@@ -33,6 +33,7 @@ class Calibration:
     first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
     closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
         "something else acts there"
+    leaves : what its family may leave, in what whatever may act there leaves, to be as likely
     steepness : exponent of these transitions
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
@@ -45,6 +46,7 @@ class Calibration:
     first_toll: float = 9.0
     second_toll: float = 9.0
     closes: float = 0.5
+    leaves: float = 2.0
     steepness: float = 4.0
     real: float = 2.5
     walls: float = 0.9
@@ -152,7 +154,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     """Probability that an effect of the structure is what acts at its place, 0..1."""
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
-    against = [(1.0 - one.closes) / (1.0 - c.closes), one.at_bounds / c.walls, c.least / max(one.share, 1e-9),
+    against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
+               one.at_bounds / c.walls, c.least / max(one.share, 1e-9),
                c.slight / max(closed, 1e-9)]  # fmt: skip
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.diagnosis.report.quantities import quantity_cells, readable
-from pneumo_ros.diagnosis.report.rig_map import draw_map
 from pneumo_ros.diagnosis.report.steps import Asked
-from pneumo_ros.diagnosis.report.story import TITLES, UNITS, Known, Story, gains, own_parameters, story
+from pneumo_ros.diagnosis.report.story import Known, Story, gains, own_parameters, story
 from pneumo_ros.diagnosis.report.words import (
     LIKELY,
     effect_name,
@@ -27,11 +28,9 @@ from pneumo_ros.diagnosis.report.words import (
     whole_percents,
     winner,
 )
-from pneumo_ros.diagnosis.signals import MEASURED, Signals
 from pneumo_ros.diagnosis.where import Law
-from pneumo_ros.effects.contract import Effect
 
-ZOOM = 3.0  # s of overlay shown, where the refitted model is furthest off
+ZOOM = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off
 SHOWN_CHANNELS = 2  # the rest is folded away
 
 
@@ -52,14 +51,15 @@ class Findings:
     regimes : sentences on when the gap shows
     conditional : subsystem -> gap when it is run alone
     laws : what is missing at the places, as curves
+    card : how the page speaks of the rig
     mended : held-out gap with flexible corrections at the places found, no law named; None to leave it out
     """
 
     summary: Mapping[str, Any]
     trajectories: Mapping[str, Array]
-    holdout: Signals
+    holdout: Any
     fit_names: Sequence[str]
-    library: Mapping[str, Effect] = field(default_factory=dict)
+    library: Mapping[str, Any] = field(default_factory=dict)
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     own: Sequence[str] = ()
     asked: Asked | None = None
@@ -67,6 +67,7 @@ class Findings:
     conditional: Mapping[str, float] = field(default_factory=dict)
     laws: Sequence[Law] = ()
     mended: float | None = None
+    card: RigCard = HALF_CAR
 
     @property
     def phrases(self) -> dict[str, str]:
@@ -76,7 +77,9 @@ class Findings:
 
 def told(found: Findings) -> Story:
     """The first screen."""
-    known = Known(found.library, gains(found.holdout, found.trajectories), found.priors, found.own, found.asked)
+    known = Known(
+        found.library, gains(found.holdout, found.trajectories, found.card), found.priors, found.own, found.asked
+    )
     return story(found.summary, known)
 
 
@@ -88,7 +91,7 @@ def contents(found: Findings) -> dict[str, Any]:
     shares = _shares(summary) if blamed else {}
     charts, first = _charts(found), told(found)
     return {
-        "title": f"Gap of {found.holdout.rig.name}",
+        "title": f"Gap of {_rig_name(found)}",
         "verdict": summary["verdict"],
         "headline": first.headline,
         "confidence": first.confidence,
@@ -98,7 +101,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "next_steps": [{"text": step.text, "commands": step.commands} for step in first.steps],
         "waterfall": waterfall(budget_rows(summary), blamed) if told_of and summary.get("budget") else "",
         "measured": _measured(summary) if blamed else [],
-        "map": draw_map(shares),
+        "map": found.card.picture(shares),
         "places": [
             {"name": place, "words": place_words(place), "share": whole}
             for place, whole in zip(shares, whole_percents(list(shares.values())), strict=True)
@@ -122,9 +125,13 @@ def contents(found: Findings) -> dict[str, Any]:
         "topics": found.holdout.topics,
         "fit_names": list(found.fit_names),
         "holdout_name": found.holdout.name,
-        "rig": found.holdout.rig.name,
+        "rig": _rig_name(found),
         "seconds": len(found.holdout.measured) * found.holdout.period,
     }
+
+
+def _rig_name(found: Findings) -> str:
+    return found.card.name or str(found.holdout.rig.name)
 
 
 def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -167,15 +174,15 @@ def _charts(found: Findings) -> list[dict[str, str]]:
 
 
 def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
-    log, name = found.holdout, MEASURED[c]
-    unit, factor = UNITS[name]
+    log, name = found.holdout, list(found.card.titles)[c]
+    unit, factor = found.card.units[name]
     measured = np.where(log.weight[:, c] > 0, log.measured[:, c], np.nan) * factor
     lines = [Line("log", "log", measured[first:last])]
     lines += [Line(key, key, run[first:last, c] * factor) for key, run in found.trajectories.items() if key in _DRAWN]
     left = [Line(key, key, measured - found.trajectories[key][:, c] * factor) for key in ("refit", "best")]
     gaps = found.summary["gap"].get("per_channel", {}).get(name, {})
     return {
-        "title": TITLES[name],
+        "title": found.card.titles[name],
         "name": name,
         "overlay": plot(log.time[first:last], lines, unit),
         "residual": plot(log.time, left, unit, height=120, band=2.0 * float(log.noise[c]) * factor),
@@ -188,9 +195,9 @@ def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
 _DRAWN = ("nominal", "refit", "best")
 
 
-def _zoom(log: Signals, refit: Array) -> tuple[int, int]:
+def _zoom(log: Any, refit: Array) -> tuple[int, int]:
     count = len(log.measured)
-    rows = min(count, round(ZOOM / log.period))
+    rows = min(count, round(ZOOM * pace_of(log).period / log.period))
     error = np.mean(((log.measured - refit) * log.weight / log.scale) ** 2, axis=1)
     total = np.concatenate([[0.0], np.cumsum(error)])
     first = int(np.argmax(total[rows:] - total[:-rows])) if count > rows else 0

@@ -65,6 +65,8 @@ def command(*words: object) -> str:
 def next_steps(summary: Mapping[str, Any], asked: Asked | None = None) -> list[Step]:
     """What to do with the verdict, the most useful first."""
     asked = asked or Asked()
+    if summary.get("rig_model"):
+        return _own_steps(summary, asked)
     if summary["verdict"] == "not_testable":
         return [_record_again(summary, asked)]
     experiment = summary.get("next_experiment")
@@ -74,6 +76,24 @@ def next_steps(summary: Mapping[str, Any], asked: Asked | None = None) -> list[S
     if not experiment and float(summary["probability"]) < LIKELY:
         steps.append(_more(asked, "Log a second session on another road and fit both.", "--road E"))
     return [*steps, _keep(summary, asked)]
+
+
+def _own_steps(summary: Mapping[str, Any], asked: Asked) -> list[Step]:
+    """For a rig of one's own, which no verb drives."""
+    verdict = str(summary["verdict"])
+    if verdict == "not_testable":
+        return [Step("Record a log that moves more, or longer.")]
+    if verdict == "unknown":
+        where = first_place(summary) or "the curves of the report"
+        return [Step(f"Look at {where}. What could be missing there is a further slot of rig.py (docs/your-rig.md).")]
+    rig = asked.rig or asked.output / "rig.yaml"
+    text = "Keep the model, with its parameters as re-estimated." if verdict == "none" else (
+        f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
+    options = () if asked.rig is not None else ("--overwrite", "--save-rig", str(rig))
+    if asked.rig is not None:
+        return [Step(f"{text} {rig} has it, for --rig of the next diagnosis.")]
+    return [Step(f"{text} A rig file has it, for --rig of the next diagnosis:",
+                 (asked.diagnosis(output=asked.output, options=options),))]  # fmt: skip
 
 
 def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:

@@ -15,6 +15,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.judge.verdict import Calibration
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
 from pneumo_ros.diagnosis.report.steps import Asked, Step, next_steps
 from pneumo_ros.diagnosis.report.words import (
@@ -31,15 +32,9 @@ from pneumo_ros.diagnosis.report.words import (
     whole_percents,
     winner,
 )
-from pneumo_ros.diagnosis.signals import MEASURED, Signals
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.sheet import check_words
 
-TITLES = {
-    "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
-    "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
-}  # fmt: skip
-UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
 TOLD = 3  # signals, rivals and own parameters that are told first
 MOVED = 1.0  # tolerances from which a parameter of the rig is worth telling
 
@@ -90,26 +85,27 @@ class Known:
     asked : what was typed
     """
 
-    library: Mapping[str, Effect]
+    library: Mapping[str, Any]
     gains: Sequence[Gain] = ()
     priors: Mapping[str, tuple[float, float]] | None = None
     own: Sequence[str] = ()
     asked: Asked | None = None
 
 
-def gains(holdout: Signals, runs: Mapping[str, Array]) -> list[Gain]:
+def gains(holdout: Any, runs: Mapping[str, Array], card: RigCard = HALF_CAR) -> list[Gain]:
     """Of every usable signal, the one that is mended most (in its own standard deviations) first."""
     off = {key: _rms(holdout, runs[key]) for key in ("refit", "best")}
     order = np.argsort(-(off["refit"] - off["best"]) / holdout.scale)
     out = []
     for c in (int(c) for c in order if holdout.usable[c]):
-        unit, factor = UNITS[MEASURED[c]]
+        name = list(card.titles)[c]
+        unit, factor = card.units[name]
         values = (factor * float(x[c]) for x in (off["refit"], off["best"], holdout.noise))
-        out.append(Gain(TITLES[MEASURED[c]], unit, *values))
+        out.append(Gain(card.titles[name], unit, *values))
     return out
 
 
-def _rms(log: Signals, run: Array) -> Array:
+def _rms(log: Any, run: Array) -> Array:
     weight = np.maximum(log.weight.sum(axis=0), 1.0)
     return np.sqrt((log.weight * (log.measured - run) ** 2).sum(axis=0) / weight)
 

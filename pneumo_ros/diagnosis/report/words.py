@@ -88,7 +88,11 @@ def place_words(place: str) -> str:
         "body_heave": "the body (up and down)", "body_pitch": "the body (pitch)", "road_input": "the road input",
         "supply": "the air supply",
     }  # fmt: skip
+    if place.startswith("input:"):
+        return f"the input {place.removeprefix('input:').replace('_', ' ')}"
     end, _, part = place.partition("_")
+    if place not in words and end not in ("front", "rear"):
+        return f"the slot {place.replace('_', ' ')}"
     parts = {"air": "air and valve", "force": "spring force"}
     return words.get(place, f"the {end} {parts.get(part, part)}")
 

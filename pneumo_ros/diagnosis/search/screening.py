@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.solver import CORRELATION, COST_FLOOR, HUBER, Fit, robust_scale
+from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, HUBER, Fit, robust_scale
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.effects.parameters import Active, EffectParameter, family_of, is_law
 
@@ -84,7 +84,7 @@ def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
         seen = np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6
         return Trial(part, values, change) if seen else None
 
-    starts = [(p, v) for p in parts for v in start_values(problem.model.effects[p[0]].parameters)]
+    starts = [(p, v) for p in parts for v in start_values(problem.effect_parameters(Candidate((p,))))]
     return [trial for trial in problem.each(tried, starts) if trial is not None]
 
 
@@ -148,7 +148,7 @@ def compatible(model: Model, one: Part, other: Part) -> bool:
 
 def _signed(problem: Problem, trial: Trial) -> bool:
     """Whether its sizes may as well be negative."""
-    return all(p.low < 0.0 for p in problem.model.effects[trial.part[0]].parameters if p.size)
+    return all(p.low < 0.0 for p in problem.effect_parameters(Candidate((trial.part,))) if p.size)
 
 
 def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
@@ -156,7 +156,7 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
     believed.
     """
     factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
-    parameters = problem.model.effects[trial.part[0]].parameters
+    parameters = problem.effect_parameters(Candidate((trial.part,)))
     return tuple(
         float(np.clip(v * factor, p.low, p.high)) if p.size else v
         for v, p in zip(trial.values, parameters, strict=True)
@@ -172,7 +172,7 @@ def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) 
     root = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-12)))
     weighted = (r * root).ravel()
     mean = float(np.mean(weighted**2))
-    strength = 1.0 / (CORRELATION * (COST_FLOOR + mean))
+    strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + mean))
     low, high = problem.bounds(base.candidate)
     free = np.ones(len(base.x), dtype=bool)
     if held:

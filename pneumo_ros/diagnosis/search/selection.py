@@ -17,7 +17,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import CORRELATION, Fit
+from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.paths import share_file
 
 FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
@@ -126,7 +126,7 @@ def score(problem: Problem, fit: Fit) -> Scored:
         blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
     values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
     stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
-    samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / CORRELATION
+    samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
     return Scored(fit, float(np.mean(values)), values, stretch, float(samples))
 
 

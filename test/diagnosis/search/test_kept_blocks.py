@@ -11,7 +11,8 @@ import pytest
 from helpers.driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import BLOCK, SELECT_EVERY, Problem
+from pneumo_ros.diagnosis.fit.pace import HALF_CAR
+from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Problem
 from pneumo_ros.diagnosis.model import EffectLike, PlainEffect
 from pneumo_ros.diagnosis.search.competition import Effort, compete
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
@@ -60,7 +61,7 @@ def record(hit: int) -> DrivenLog:
     """A small wave, and one blow that reaches the stop in block ``hit``."""
     t = PERIOD * np.arange(round(SECONDS / PERIOD))
     drive = np.sin(2.0 * np.pi * 0.9 * t)
-    drive[(t > BLOCK * hit + 0.2) & (t < BLOCK * hit + 0.5)] += 3.0
+    drive[(t > HALF_CAR.block * hit + 0.2) & (t < HALF_CAR.block * hit + 0.5)] += 3.0
     clean = Lag().predict(DrivenLog(t, drive), np.array([RATE]), np.zeros(1), [Active("stop", "", (STOP,))])
     return DrivenLog(clean + NOISE * np.random.default_rng(hit).normal(size=clean.shape), drive)
 

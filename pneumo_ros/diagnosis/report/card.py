@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How report and terminal speak of a rig: its name, what its channels are called and shown in, and its picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from pneumo_ros.diagnosis.report.rig_map import draw_map
+from pneumo_ros.diagnosis.signals import MEASURED
+
+TITLES = {
+    "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
+    "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
+}  # fmt: skip
+UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+
+
+@dataclass(frozen=True)
+class RigCard:
+    """A rig as people speak of it.
+
+    Attributes
+    ----------
+    titles : channel -> what it is called, in the order of the record's columns
+    units : channel -> unit shown, and factor to it
+    picture : shares by place -> SVG
+    name : of the rig; "" where the record's own says it
+    """
+
+    titles: Mapping[str, str]
+    units: Mapping[str, tuple[str, float]]
+    picture: Callable[[Mapping[str, float]], str]
+    name: str = ""
+
+
+HALF_CAR = RigCard(TITLES, UNITS, draw_map)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis of one's own rig from files: rig.py, rig.yaml, logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
+from pneumo_ros.diagnosis.result import Diagnosis
+from pneumo_ros.diagnosis.search.competition import Progress
+from pneumo_ros.errors import InputError, not_one_of
+from pneumo_ros.own_rig.description import read_description
+from pneumo_ros.own_rig.model import OwnRig, own_rig
+from pneumo_ros.own_rig.physics import load_physics
+from pneumo_ros.own_rig.records import FEWEST, OwnRecord, read_record
+from pneumo_ros.own_rig.whereabouts import whereabouts
+from pneumo_ros.slots.laws import LAWS
+
+
+@dataclass(frozen=True)
+class OwnTask:
+    """Logs that were read and the model that fits them."""
+
+    model: OwnRig
+    fit: tuple[OwnRecord, ...]
+    holdout: OwnRecord
+    notes: tuple[str, ...] = ()
+
+    def diagnose(self, options: Options | None = None, progress: Progress | None = None) -> Diagnosis:
+        """Run the diagnosis; what is left is located by whatever closes it."""
+        chosen = options or Options()
+        if chosen.locate is None:
+            chosen = replace(chosen, locate=whereabouts)
+        found = diagnose(self.model, self.fit, self.holdout, chosen, progress)
+        return replace(found, notes=(*self.notes, *found.notes))
+
+
+def rig_file_of(model: Path, rig: Path | None) -> Path:
+    """The rig file: the one that is named, or the one beside rig.py under its name."""
+    return rig if rig is not None else model.with_suffix(".yaml")
+
+
+def prepared(
+    model: Path, fit: Sequence[Path], holdout: Path | None = None, rig: Path | None = None, without: Sequence[str] = ()
+) -> OwnTask:
+    """Read everything and build the model.
+
+    Parameters
+    ----------
+    model, rig : rig.py and its YAML; by default the one of the same name beside it
+    fit, holdout : logs; without a held-out one the end of the last fitted one is held out
+    without : families that do not compete
+
+    Raises
+    ------
+    InputError
+        for whatever cannot be used, in one line.
+    """
+    if not fit:
+        raise InputError("no log to fit", remedy="give at least one log")
+    families = sorted({law.id.partition(".")[0] for law in LAWS})
+    for name in without:
+        if name not in families:
+            raise not_one_of("unknown family", name, families, key="without")
+    description = read_description(rig_file_of(model, rig))
+    physics = load_physics(model, description)
+    records = [read_record(path, description) for path in fit]
+    notes = []
+    if not physics.kernel.compiled:
+        notes.append(f"numba cannot compile {model.name}, which makes it about a hundred times slower: "
+                     f"{physics.kernel.why_not}")  # fmt: skip
+    if holdout is None:
+        logs, held = split_by_time(records)
+        notes.append("no held-out log was given: the end of the last fit log is held out, which tests less")
+    else:
+        logs, held = records, read_record(holdout, description)
+    _check_alike(logs, held)
+    if description.effects:
+        names = ", ".join(f"{one.effect} ({one.site})" for one in description.effects)
+        notes.append(f"the rig file names {names}: part of the model as stated there; what competes is what the logs "
+                     "show beyond it")  # fmt: skip
+    return OwnTask(own_rig(description, physics, logs, without), tuple(logs), held, tuple(notes))
+
+
+def _check_alike(logs: Sequence[OwnRecord], held: OwnRecord) -> None:
+    for one in (*logs, held):
+        if len(one.measured) < FEWEST:
+            raise InputError("too few rows to fit or to hold out", where=one.name, value=len(one.measured),
+                             allowed=f"at least {FEWEST}", remedy="record longer, or give a held-out log")  # fmt: skip

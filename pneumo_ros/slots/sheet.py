@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/families.md: what may be missing at each kind of slot, made from the registry."""
+
+from __future__ import annotations
+
+from pneumo_ros.effects.parameters import family_of
+from pneumo_ros.slots.kinds import Contact, Flow, Force, Input, Sensor, Slot
+from pneumo_ros.slots.laws import LAWS, Law
+from pneumo_ros.slots.library import families_of
+from pneumo_ros.slots.shapes import CONES, ROWS
+
+KINDS: tuple[type[Slot], ...] = (Force, Contact, Flow, Input, Sensor)
+
+
+def families_page() -> str:
+    """The page's body, Markdown."""
+    return "\n".join(_kind(kind) for kind in KINDS)
+
+
+def _kind(kind: type[Slot]) -> str:
+    about = next(line for line in (kind.__doc__ or "").splitlines() if line.strip())
+    rows = [_row(law, kind.kind) for law in LAWS if kind.kind in law.kinds]
+    atoms = ", ".join(f"{row.name} ({row.count})" for row in ROWS[kind.kind])
+    shaped = ", ".join(f"`{family}`" for family in families_of(kind.kind) if family in CONES[kind.kind])
+    return (f"## {kind.__name__}\n\n{about}\n\n| family | law | what it is | parameters |\n|---|---|---|---|\n"
+            + "\n".join(rows) + f"\n\nFamilies with a shape: {shaped}. Whatever may act there: {atoms}.\n")  # fmt: skip
+
+
+def _row(law: Law, kind: str) -> str:
+    unit, travel = {"input": ("unit", "unit"), "sensor": ("unit", "unit")}.get(kind, ("unit", "travel"))
+    knobs = [f"{k.name.replace('_', ' ')} ({k.unit.format(unit=unit, travel=travel)})" for k in law.knobs]
+    family = family_of(law.id)
+    own = law.id.partition(".")[2] or "-"
+    loaded = "; needs `load`" if law.needs_load and kind in ("force", "contact") else ""
+    fed = "; needs `flow`" if law.needs_load and kind == "flow" else ""
+    return f"| `{family}` | {own} | {law.summary}{loaded}{fed} | {', '.join(knobs)} |"

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Laws and atoms of a signal on its way: into the rig (an actuator) or into the log (a sensor).
+
+``P`` are the values of all laws and atoms (0: absent), in the signal's unit, seconds or shares; ``S`` its scales. Whole
+logs pass at once: first what the value alone decides, then what takes time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.filters import first_order_line
+
+# Laws: columns of P.
+GAIN, OFFSET, SQUARE, CUBE = 0, 1, 2, 3
+LAG, SECOND_LAG, DELAY = 4, 5, 6
+DEAD, CUT, SOFT_CUT, PLAY = 7, 8, 9, 10
+LAWS = 11
+
+# Atoms.
+POWERS = LAWS  # constant, linear, square, cube
+CORNERS = POWERS + 4  # what a dead zone of S_DEAD takes away
+LIMITS = CORNERS + 3  # what a limit at S_LIMITS takes away
+PLAYS = LIMITS + 3  # shares that pass a play of S_PLAYS
+LAGS = PLAYS + 3  # shares that pass a lag of S_LAGS
+DELAYS = LAGS + 4  # shares that are S_DELAYS late
+VALUES = DELAYS + 3
+
+# Scales.
+S_DEAD, S_LIMITS, S_PLAYS, S_LAGS, S_DELAYS = 0, 3, 6, 9, 13
+S_MIDDLE, S_SWING, S_PEAK = 16, 17, 18
+SCALES = 19
+
+
+@njit(cache=True)
+def _played(u: Array, half: float) -> Array:
+    y, held = np.empty_like(u), u[0]
+    for i in range(u.shape[0]):
+        held = min(max(held, u[i] - half), u[i] + half)
+        y[i] = held
+    return y
+
+
+def lagged(u: Array, period: float, lag: float) -> Array:
+    """First order lag of a linearly interpolated signal that has rested at its first value."""
+    return first_order_line(np.ascontiguousarray(u), period, lag)[0]
+
+
+def delayed(u: Array, period: float, delay: float) -> Array:
+    """The signal ``delay`` s late, resting at its first value before."""
+    rows = np.arange(len(u))
+    return np.asarray(np.interp(rows - delay / period, rows, u))
+
+
+def _static(u: Array, P: Array, S: Array) -> Array:
+    """What the value alone decides."""
+    q = (u - S[S_MIDDLE]) / S[S_SWING]
+    out = u + P[GAIN] * u + P[OFFSET] + S[S_SWING] * (P[SQUARE] * q * q + P[CUBE] * q**3)
+    out += S[S_SWING] * sum(P[POWERS + k] * q**k for k in range(4))
+    if P[DEAD] != 0.0:
+        out -= np.clip(u, -P[DEAD], P[DEAD])
+    if P[CUT] != 0.0:
+        limit = S[S_PEAK] * (1.0 - P[CUT])
+        out = np.clip(out, -limit, limit)
+    if P[SOFT_CUT] != 0.0:
+        out = out / (1.0 + P[SOFT_CUT] * (out / S[S_PEAK]) ** 2)
+    for k in range(3):
+        if P[CORNERS + k] != 0.0:
+            out -= P[CORNERS + k] * np.clip(u, -S[S_DEAD + k], S[S_DEAD + k])
+        if P[LIMITS + k] != 0.0:
+            out -= P[LIMITS + k] * (u - np.clip(u, -S[S_LIMITS + k], S[S_LIMITS + k]))
+    return np.asarray(out)
+
+
+def passed(u: Array, period: float, P: Array, S: Array) -> Array:
+    """A signal (N,) after its way; not finite where a wild error is."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _passed(u, period, P, S)
+
+
+def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
+    out = _static(u, P, S)
+    if P[PLAY] != 0.0:
+        out = _played(out, P[PLAY])
+    if P[LAG] != 0.0:
+        out = lagged(out, period, P[LAG])
+    if P[SECOND_LAG] != 0.0:
+        out = lagged(lagged(out, period, P[SECOND_LAG]), period, P[SECOND_LAG])
+    if P[DELAY] != 0.0:
+        out = delayed(out, period, P[DELAY])
+    shared = np.zeros_like(out)
+    for first, count, scale, way in (
+        (PLAYS, 3, S_PLAYS, lambda s: _played(out, s)),
+        (LAGS, 4, S_LAGS, lambda s: lagged(out, period, s)),
+        (DELAYS, 3, S_DELAYS, lambda s: delayed(out, period, s)),
+    ):
+        for k in range(count):
+            if P[first + k] != 0.0:
+                shared += P[first + k] * (way(float(S[scale + k])) - out)
+    return np.asarray(out + shared)
+
+
+def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:
+    """What a sensor with these values alone was shown to read ``y``, by fixed point; ways that take time are left."""
+    still = P.copy()
+    still[[LAG, SECOND_LAG, DELAY, PLAY, CUT]] = 0.0
+    still[PLAYS:VALUES] = 0.0
+    true = y.copy()
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(rounds):
+            true = true - (_static(true, still, S) - y)
+    return np.where(np.isfinite(true), true, y)
+
+
+def scales_of(u: Array, period: float) -> Array:
+    """Scales (SCALES,) from a signal's samples; ``period`` s of its slowest motion."""
+    S = np.ones(SCALES)
+    peak = max(float(np.quantile(np.abs(u), 0.998)), 1e-12)
+    low, high = (float(v) for v in np.quantile(u, [0.002, 0.998]))
+    swing = max(0.5 * (high - low), 1e-12)
+    S[S_DEAD : S_DEAD + 3] = np.array([0.03, 0.12, 0.35]) * peak
+    S[S_LIMITS : S_LIMITS + 3] = np.array([0.5, 0.75, 0.9]) * peak
+    S[S_PLAYS : S_PLAYS + 3] = np.array([0.03, 0.12, 0.35]) * swing
+    S[S_LAGS : S_LAGS + 4] = np.array([0.005, 0.02, 0.08, 0.3]) * period
+    S[S_DELAYS : S_DELAYS + 3] = np.array([0.01, 0.04, 0.15]) * period
+    S[S_MIDDLE], S[S_SWING], S[S_PEAK] = 0.5 * (low + high), swing, peak
+    return S

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small rig of one's own for tests: a cart on a spring, its two files and its log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+PERIOD = 0.01  # s
+CART = """
+from pneumo_ros.own_rig import Force, Input, Sensor
+
+SLOTS = [
+    Force("rail", travel=lambda x, u, p: x.position, rate=lambda x, u, p: x.speed),
+    Input("force"),
+    Sensor("position"),
+]
+
+
+def rhs(x, u, p, f):
+    return x.speed, (u.force - p.stiffness * x.position - p.damping * x.speed + f.rail) / p.mass
+
+
+def outputs(x, u, p, f):
+    return (x.position,)
+"""
+CART_YAML = """
+rig: cart
+time: {field: t, unit: s}
+channels:
+  position: {field: x, unit: mm}
+inputs:
+  force: {unit: N}
+states: {position: position, speed: rate of position}
+parameters: {mass: 2 +- 0.05 kg, stiffness: 80 +- 4 N/m, damping: 1 +- 0.2 N s/m}
+"""
+
+
+def written(folder: Path, physics: str = CART, names: str = CART_YAML) -> Path:
+    """rig.py and rig.yaml in a folder; the path of rig.py."""
+    (folder / "rig.yaml").write_text(names, encoding="utf-8")
+    (folder / "rig.py").write_text(physics, encoding="utf-8")
+    return folder / "rig.py"
+
+
+def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1) -> Path:
+    """A log of the cart with dry friction that turns over within 2 mm/s."""
+    t = np.arange(0.0, seconds, PERIOD)
+
+    def pull(time: float) -> float:
+        return float(4.0 * np.sin(2.0 * time) + 3.0 * np.sin(5.3 * time + 1.0) + 2.0 * np.sin(9.1 * time))
+
+    def rates(time: float, y: np.ndarray) -> list[float]:
+        rub = friction * np.tanh(y[1] / 2e-3)
+        return [y[1], (pull(time) - 82.0 * y[0] - 1.1 * y[1] - rub) / 2.02]
+
+    x = solve_ivp(rates, (0.0, t[-1]), (0.0, 0.0), t_eval=t, max_step=2e-3).y[0]
+    x += np.random.default_rng(seed).normal(0.0, 2e-5, len(t))
+    table = np.column_stack([t, 1e3 * x, [pull(one) for one in t]])
+    np.savetxt(path, table, "%.6f", ",", header="t,x,force", comments="")
+    return path

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The free run of a user's model: against scipy, plain as compiled, compiled once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.own_rigs import CART, CART_YAML, cart_log, written
+from scipy.integrate import solve_ivp
+
+from pneumo_ros.diagnosis.signals.types import TopicTiming
+from pneumo_ros.effects.parameters import Active
+from pneumo_ros.own_rig.description import read_description
+from pneumo_ros.own_rig.from_files import prepared
+from pneumo_ros.own_rig.kernel import self_contained
+from pneumo_ros.own_rig.model import OwnRig
+from pneumo_ros.own_rig.physics import load_physics
+from pneumo_ros.own_rig.records import OwnRecord, read_record
+
+
+@pytest.fixture(scope="module")
+def cart(tmp_path_factory: pytest.TempPathFactory) -> tuple[OwnRig, OwnRecord]:
+    folder = tmp_path_factory.mktemp("cart")
+    task = prepared(written(folder), [cart_log(folder / "log.csv", friction=0.0)])
+    return task.model, task.fit[0]
+
+
+def test_the_free_run_is_scipys(cart: tuple[OwnRig, OwnRecord]) -> None:
+    model, record = cart
+    nominal = np.array([p.nominal for p in model.parameters])
+    start = np.array([0.003, -0.02])
+    m, k, c = nominal
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        return [y[1], (np.interp(t, record.time, record.inputs[:, 0]) - k * y[0] - c * y[1]) / m]
+
+    exact = solve_ivp(rates, (0.0, record.time[-1]), start, t_eval=record.time, max_step=2e-3, rtol=1e-9).y[0]
+    assert np.abs(model.predict(record, nominal, start, ())[:, 0] - exact).max() < 2e-6 * np.abs(exact).max() + 1e-9
+
+
+def test_dry_friction_stops_the_cart(cart: tuple[OwnRig, OwnRecord]) -> None:
+    """Undriven, 2 F / k are lost a half swing, and it stays where the spring no longer overcomes friction."""
+    model, record = cart
+    still = type(record)(**{**vars(record), "inputs": np.zeros_like(record.inputs)})
+    nominal = np.array([2.0, 80.0, 0.0])
+    path = model.predict(still, nominal, np.array([0.1, 0.0]), (Active("coulomb_friction", "rail", (0.8,)),))[:, 0]
+    peaks = [abs(path[i]) for i in range(1, len(path) - 1) if (path[i] - path[i - 1]) * (path[i + 1] - path[i]) < 0]
+    assert peaks[0] == pytest.approx(0.1 - 2 * 0.8 / 80.0, abs=5e-4)
+    assert abs(path[-1]) < 0.8 / 80.0
+
+
+def test_what_a_sensor_does_is_taken_out_of_the_start(cart: tuple[OwnRig, OwnRecord]) -> None:
+    model, record = cart
+    plain, _ = model.initial(record)
+    seen, _ = model.initial(record, (Active("scale", "sensor:position", (0.25,)),))
+    assert seen == pytest.approx(plain / 1.25, rel=1e-3)
+
+
+def test_plain_python_runs_the_same(cart: tuple[OwnRig, OwnRecord], tmp_path: Path) -> None:
+    model, record = cart
+    slow = CART.replace("return x.speed,", "names = {'a': [1, 'b']}; assert names\n    return x.speed,")
+    rig = read_description(written(tmp_path, slow).with_suffix(".yaml"))
+    physics = load_physics(tmp_path / "rig.py", rig)
+    assert not physics.kernel.compiled and physics.kernel.why_not
+    short = record.slice(0, 60)
+    plain = OwnRig(rig, physics, model.scaling)
+    active = (Active("coulomb_friction", "rail", (0.8,)),)
+    nominal, start = np.array([2.0, 80.0, 1.0]), np.array([0.01, 0.1])
+    assert np.allclose(plain.predict(short, nominal, start, active), model.predict(short, nominal, start, active),
+                       rtol=1e-12, atol=1e-15)  # fmt: skip
+
+
+def test_only_what_depends_on_its_text_alone_is_kept_compiled() -> None:
+    assert self_contained(CART)
+    assert not self_contained("import my_tables\n")
+    assert not self_contained("TABLE = np.loadtxt('table.csv')\n")
+
+
+def test_a_record_knows_its_gaps_and_its_timing(tmp_path: Path) -> None:
+    log = cart_log(tmp_path / "log.csv", friction=0.0)
+    lines = log.read_text().splitlines()
+    log.write_text("\n".join(lines[:500] + lines[540:]) + "\n")
+    record = read_record(log, read_description(written(tmp_path).with_suffix(".yaml")))
+    assert record.period == pytest.approx(0.01)
+    assert 35 <= np.count_nonzero(record.weight == 0.0) <= 41
+    timing: TopicTiming = record.topics[0]
+    assert timing.missing == 40 and timing.rate == pytest.approx(100.0)
+    assert "position" in CART_YAML and record.names == ("position",)
