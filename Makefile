@@ -15,7 +15,8 @@ help:  ## Show this list
 
 $(READY): requirements.lock setup.py package.xml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input -r requirements.lock
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --require-hashes \
+		-r requirements.lock
 	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --no-deps --no-build-isolation --editable .
 	@touch $@
 
@@ -103,7 +104,7 @@ docs: $(READY)  ## Write the generated tables of docs/ anew
 
 lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
 	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra view --extra dev \
-		--no-emit-index-url --no-annotate --no-header --output-file requirements.lock
+		--generate-hashes --no-emit-index-url --no-annotate --no-header --output-file requirements.lock
 
 clean:  ## Remove the virtual environment and what was built
 	rm -rf $(VENV) $(FLOORS) build *.egg-info bench/build

@@ -41,13 +41,18 @@ def main() -> None:
                 table[kind] += attacked(witness, kind, direction, FLOOD if seed == options.seed else 50_000)
         faults += witness.faults
         recorded, seed = witness.recorded, seed + 1
-        print(f"round {seed - options.seed}: {sum(row['frames'] for row in table.values())} frames", flush=True)
-    print(f"| line | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}")
-    table["all"] = sum(table.values(), Counter())
-    for kind, row in table.items():
-        print(f"| {kind.replace('_', ' ')} | {' | '.join(str(row[name]) for name in COLUMNS)} |")
+        print(f"round {seed - options.seed}: {sum(row['frames'] for row in table.values())} frames, "
+              f"{len(faults)} faults", flush=True)  # fmt: skip
+    show(table)
     print(*faults[:5], sep="\n")
     sys.exit(1 if faults else 0)
+
+
+def show(table: dict[str, Counter[str]]) -> None:
+    """A row for each kind of line, and all together."""
+    print(f"| line | {' | '.join(COLUMNS)} |\n|{'---|' * (len(COLUMNS) + 1)}")
+    for kind, row in {**table, "all": sum(table.values(), Counter())}.items():
+        print(f"| {kind.replace('_', ' ')} | {' | '.join(str(row[name]) for name in COLUMNS)} |")
 
 
 def attacked(witness: Witness, kind: str, direction: str, flood: int) -> Counter[str]:

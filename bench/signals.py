@@ -193,6 +193,8 @@ def main() -> int:
     parser.add_argument("--signals", nargs="+", default=SIGNALS, choices=SIGNALS)
     parser.add_argument("--results", type=Path, help="file of outcomes, a line each, that is read first and added to")
     arguments = parser.parse_args()
+    for number in (signal.SIGHUP, signal.SIGQUIT):  # nohup and a shell's background jobs hand down ignored ones
+        signal.signal(number, signal.SIG_DFL)
     known = outcomes(arguments.results)
     wrong = rows = 0
     print(f"{'mode':9s} {'process':17s} {'signal':9s} {'good':5s} {'code':>4s} {'samples':>7s} {'safe':5s} sentence")

@@ -12,6 +12,7 @@ import typer.main
 from helpers.folders import ROOT
 
 from pneumo_ros.cli.main import VERBS, app
+from pneumo_ros.effects.loading import laws_of, load_library
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TYPED = re.compile(r"\bpneumo ((?:[a-z][a-z-]* )*[a-z][a-z-]*)([^`|\n]*)")
@@ -62,3 +63,13 @@ def test_every_phony_target_has_a_rule() -> None:
 def test_every_link_leads_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target
+
+
+def test_the_families_of_the_readme_are_the_librarys() -> None:
+    table = (ROOT / "README.md").read_text(encoding="utf-8").split("## What it can name")[1].split("##")[0]
+    named = re.findall(r"`([a-z_]+)`", table.split("`pneumo effects")[0])
+    assert sorted(named) == sorted(laws_of(load_library()))
+
+
+def test_the_picture_of_the_readme_is_small() -> None:
+    assert (ROOT / "docs" / "images" / "report.png").stat().st_size < 150_000

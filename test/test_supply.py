@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -33,3 +34,14 @@ def test_no_text_becomes_code(file: Path) -> None:
         if name in ("yaml.load", "yaml.parse"):
             assert words.get("Loader") == "_LOADER" and file.name == "documents.py", f"line {call.lineno}"
         assert name not in ("yaml.unsafe_load", "yaml.full_load", "yaml.load_all"), f"line {call.lineno}"
+
+
+def test_every_package_of_the_lock_is_pinned_with_hashes() -> None:
+    """Two at least where there is a wheel and a source, one in any case; pip then takes these files and no others."""
+    entries = re.split(r"\n(?=\S)", (ROOT / "requirements.lock").read_text(encoding="utf-8").strip())
+    assert len(entries) > 100
+    for entry in entries:
+        assert re.match(r"[a-z0-9._-]+==[0-9][^ ]*( ; [^\\]+)? \\\n", entry), entry
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert re.search(r"pip install [^\n]*--require-hashes \\\n\t\t-r requirements\.lock", recipe)

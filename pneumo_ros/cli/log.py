@@ -239,7 +239,9 @@ def _topic_figures(topic: TopicReport) -> list[str]:
         return [str(topic.count), *[""] * 6]
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
     delay = f"{t.delay_p50 * 1e3:.2g}, {t.delay_p99 * 1e3:.2g}"
-    numbers = [f"{topic.duration:.2f}", f"{t.rate_hz:.4g}", f"{t.jitter * 1e3:.2g}", str(t.missing), delay]
+    jitter = t.jitter * 1e3
+    regular = [f"{one:{form}}" if math.isfinite(one) else "" for one, form in ((t.rate_hz, ".4g"), (jitter, ".2g"))]
+    numbers = [f"{topic.duration:.2f}", *regular, str(t.missing), delay]
     return [str(topic.count), *numbers, ", ".join(clock) or "ok"]
 
 

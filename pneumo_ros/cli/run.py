@@ -134,6 +134,8 @@ def run(
     tell_assumed(console, checked, rig)
     if checked.effects:
         _tell_effects(console, checked, source)
+    if source == "sim":
+        _compile(console, str(values["plant"].get("simulated_rig", "")) or rig, values["plant"])
     if use_sim_time:
         for own in values.values():
             own["use_sim_time"] = True
@@ -286,6 +288,23 @@ def _standing_rig(file: str) -> Rig:
 
         standing_effects(rig, library_of(rig))
     return rig
+
+
+def _compile(console: Console, file: str | Path | None, plant: dict[str, Value]) -> None:
+    """Equations with effects are compiled once on a machine, in many seconds on a slow one: no node waits for that."""
+    from pneumo_ros.rig import load_rig
+
+    rig = load_rig(file or None)
+    if not rig.diagnosed:
+        return
+    import numpy as np
+
+    from pneumo_ros.effects.stepping import stepped_rig
+    from pneumo_ros.plant.trim import trim
+
+    with console.status("compiling the rig's equations, once on this machine"):
+        stepped = stepped_rig(rig, 1.0 / float(plant["rate_hz"]))
+        stepped.step(stepped.init(), trim(rig).command, np.zeros((2, 2)))
 
 
 def _check_profile(values: Values, rig: Rig) -> None:

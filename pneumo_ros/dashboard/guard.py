@@ -8,11 +8,12 @@ import ipaddress
 import re
 import socket
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
+from bokeh.util.token import get_session_id
 from tornado.httputil import HTTPHeaders, HTTPServerRequest
 from tornado.web import OutputTransform, RequestHandler
 
@@ -38,13 +39,13 @@ class Guard:
     ----------
     host, port : what the server listens on
     token : asked of every request
-    viewers : how many tabs are open
+    viewers : Bokeh sessions of the tabs that are open
     """
 
     host: str
     port: int
     token: str
-    viewers: Callable[[], int]
+    viewers: Callable[[], Collection[str]]
 
     def refusal(self, request: HTTPServerRequest) -> Refusal | None:
         """Why not, or None."""
@@ -56,9 +57,16 @@ class Guard:
             return Refusal(403, "A page of another origin may not use this dashboard.")
         if not self.entitled(request):
             return Refusal(403, "This dashboard needs its token: open the address that `pneumo view` printed.")
-        if self.viewers() >= MAX_VIEWERS and request.path == "/":
+        if self.crowded(request, socketed):
             return Refusal(503, f"{MAX_VIEWERS} tabs are open already: close one and load this page again.")
         return None
+
+    def crowded(self, request: HTTPServerRequest, socketed: bool) -> bool:
+        """Whether it would open one tab too many, by the page or by a web socket with a session of its own making."""
+        there = self.viewers()
+        if len(there) < MAX_VIEWERS:
+            return False
+        return request.path == "/" or (socketed and session_of(request) not in there)
 
     def knows(self, host: str) -> bool:
         """Whether the Host header names this server: by address, or by the name of this computer.
@@ -89,6 +97,15 @@ class Guard:
         # Each is compared in full, in a time that says nothing of where it differs.
         equal = [hmac.compare_digest(text.encode(), self.token.encode()) for text in given]
         return any(equal)
+
+
+def session_of(request: HTTPServerRequest) -> str:
+    """The Bokeh session a web socket asks for; '' if what it sent is none."""
+    token = request.headers.get("Sec-WebSocket-Protocol", "").rpartition(",")[2].strip()
+    try:
+        return str(get_session_id(token))
+    except Exception:  # whatever a stranger's bytes do to a decoder
+        return ""
 
 
 def is_loopback(host: str) -> bool:

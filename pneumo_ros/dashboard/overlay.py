@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs laid over each other: measured, nominal, corrected and residual of a diagnosis, or two sessions."""
+"""Logs laid over each other, and what they differ by: the runs of a diagnosis, or two sessions."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 from bokeh.document import Document
-from bokeh.layouts import column, gridplot, row
+from bokeh.layouts import column
 from bokeh.models import (
     CheckboxButtonGroup,
     ColumnDataSource,
     CrosshairTool,
     CustomJS,
     HoverTool,
+    InlineStyleSheet,
     Legend,
     LegendItem,
     Range1d,
@@ -26,18 +27,19 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from pneumo_ros.dashboard.panels import thin
+from pneumo_ros.dashboard.shell import furnish, side_by_side, wrapping
+from pneumo_ros.dashboard.viewer_layouts import RESIDUAL, RUNS
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import align, start_of
 from pneumo_ros.log.reading import Log
 from pneumo_ros.log.topics import DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE
 
 CHANNELS = (*DISPLACEMENT.names, "front_pressure", "rear_pressure")
-PREFIXES = {"measured": "#999999", "nominal": "#1f77b4", "refit": "#9467bd", "corrected": "#2ca02c",
-            "residual": "#d62728"}  # fmt: skip
 PAIR = ("#1f77b4", "#d62728")
 POINTS = 4000  # a curve
 SEGMENT = 1024  # samples of a spectrum's windows
 HEIGHT = 240  # px
+BENEATH = 3.0  # px; the first run shows on both sides of one that follows it
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def series_of(log: Log, second: Log | None = None) -> list[Series]:
         if a log has none of the channels, saying what it has.
     """
     if second is None and is_residual(log):
-        prefixes = [name for name in PREFIXES if f"/{name}{DISPLACEMENT.name}" in log.topics]
-        return [_series(log, f"/{name}", name, PREFIXES[name], 0.0) for name in prefixes]
+        prefixes = [name for name in RUNS if f"/{name}{DISPLACEMENT.name}" in log.topics]
+        return [_series(log, f"/{name}", name, RUNS[name], 0.0) for name in prefixes]
     first = _series(log, _prefix(log), log.path.name, PAIR[0], 0.0)
     if second is None:
         return [first]
@@ -97,12 +99,16 @@ def unknown_topics(log: Log, wanted: list[str]) -> InputError:
 
 
 class Overlay:
-    """Three tabs of one document: over time, spectra, one channel over another."""
+    """Tabs of one document: over time, what is left, spectra, one channel over another."""
 
     def __init__(self, document: Document, title: str, series: list[Series]) -> None:
-        self._series = series
-        document.title = f"pneumo: {title}"
-        tabs = (("over time", self._over_time()), ("spectrum", self._spectra()), ("XY", self._xy()))
+        # What is left is near zero: on the axes of the signals it would flatten them.
+        self._series = [one for one in series if one.name != RESIDUAL]
+        furnish(document, title)
+        tabs = [("over time", self._over_time(self._series)), ("spectrum", self._spectra()), ("XY", self._xy())]
+        left = remainders(self._series)
+        if left:
+            tabs.insert(1, ("residual", self._over_time(left)))
         document.add_root(
             Tabs(tabs=[TabPanel(child=child, title=name) for name, child in tabs], sizing_mode="stretch_width")
         )
@@ -115,23 +121,41 @@ class Overlay:
 
     def _with_legend(self, plot: Any, lines: list[tuple[str, Any]]) -> Any:
         items = [LegendItem(label=name, renderers=[line]) for name, line in lines]
-        plot.add_layout(Legend(items=items, click_policy="hide", label_text_font_size="10px"), "right")
+        plot.add_layout(
+            Legend(
+                items=items,
+                click_policy="hide",
+                label_text_font_size="10px",
+                orientation="horizontal",
+                padding=2,
+                margin=0,
+                location="left",
+                border_line_alpha=0.0,
+            ),
+            "above",
+        )
         return plot
 
-    def _over_time(self) -> Any:
-        ends = [(float(one.time[0]), float(one.time[-1])) for one in self._series]
+    def _over_time(self, series: list[Series]) -> Any:
+        ends = [(float(one.time[0]), float(one.time[-1])) for one in series]
         shared = Range1d(min(a for a, _ in ends), max(b for _, b in ends))
         plots = []
         for k, channel in enumerate(CHANNELS):
             plot = self._figure(channel, x_range=shared, x_axis_label="s", y_axis_label=_unit(k))
             lines = []
-            for one in self._series:
+            for one in series:
                 there = np.isfinite(one.values[:, k])
                 t, y = thin(one.time[there], one.values[there, k], POINTS)
-                lines.append((one.name, plot.line(t, y, color=one.colour, name=one.name)))
+                lines.append(
+                    (
+                        one.name,
+                        plot.line(
+                            t, y, color=one.colour, name=one.name, line_width=BENEATH if one is series[0] else 1.2
+                        ),
+                    )
+                )
             plots.append(self._with_legend(plot, lines))
-        return column(_chooser(plots), gridplot(plots, ncols=2, merge_tools=False, sizing_mode="stretch_width"),
-                      sizing_mode="stretch_width")  # fmt: skip
+        return column(_chooser(plots), side_by_side(plots), sizing_mode="stretch_width")
 
     def _spectra(self) -> Any:
         from scipy.signal import welch
@@ -147,7 +171,7 @@ class Overlay:
                 f, density = welch(values, rate, nperseg=min(SEGMENT, len(values)))
                 lines.append((one.name, plot.line(f[1:], density[1:], color=one.colour, name=one.name)))
             plots.append(self._with_legend(plot, lines))
-        return gridplot(plots, ncols=2, merge_tools=False, sizing_mode="stretch_width")
+        return side_by_side(plots)
 
     def _xy(self) -> Any:
         plot = self._figure("one channel over another")
@@ -168,7 +192,20 @@ class Overlay:
             choice.on_change("value", lambda attr, old, new: show())
         show()
         plot.height = 2 * HEIGHT
-        return column(row(across, up), self._with_legend(plot, lines), sizing_mode="stretch_width")
+        return column(wrapping(across, up), self._with_legend(plot, lines), sizing_mode="stretch_width")
+
+
+def remainders(series: list[Series]) -> list[Series]:
+    """The first run minus each other one, at the first one's times; empty for a run alone."""
+    if len(series) < 2:
+        return []
+    first, out = series[0], []
+    for one in series[1:]:
+        there = np.column_stack([np.interp(first.time, one.time, column) for column in one.values.T])
+        inside = (first.time >= one.time[0]) & (first.time <= one.time[-1])
+        left = np.where(inside[:, None], first.values - there, np.nan)
+        out.append(Series(f"{first.name} - {one.name}", one.colour, first.time, left))
+    return out
 
 
 def _unit(channel: int) -> str:
@@ -178,7 +215,9 @@ def _unit(channel: int) -> str:
 def _chooser(plots: list[Any]) -> CheckboxButtonGroup:
     """Which channels are shown; the browser does it alone."""
     labels = [channel.replace("_", " ") for channel in CHANNELS]
-    group = CheckboxButtonGroup(labels=labels, active=list(range(len(plots))), name="channels")
+    wrap = InlineStyleSheet(css=".bk-btn-group { flex-wrap: wrap; } :host { max-width: 100%; }")
+    group = CheckboxButtonGroup(labels=labels, active=list(range(len(plots))), name="channels",
+                                sizing_mode="stretch_width", stylesheets=[wrap])  # fmt: skip
     code = "plots.forEach((plot, k) => { plot.visible = cb_obj.active.includes(k) })"
     group.js_on_change("active", CustomJS(args={"plots": plots}, code=code))
     return group

@@ -9,7 +9,7 @@ from html import escape
 from typing import Any
 
 from bokeh.document import Document
-from bokeh.layouts import column, gridplot, row
+from bokeh.layouts import column
 from bokeh.models import (
     Button,
     ColumnDataSource,
@@ -26,6 +26,7 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
+from pneumo_ros.dashboard.shell import furnish, side_by_side, wrapping
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
 from pneumo_ros.printable import one_line
 
@@ -55,26 +56,26 @@ class Page:
         self._last = time.monotonic()
         self._said: list[str] = []
         self._answers = Div(text="", name="answers")
-        self._gains = column(name="gains")
+        self._gains = column(name="gains", sizing_mode="stretch_width")
         self._known: tuple[Control, ...] = ()
         self._sent, self._sent_at = 0, 0.0
         self._beat, self._echo = (Div(text="0", visible=False, name=name) for name in ("beat", "echo"))
         self._beat.js_on_change("text", CustomJS(args={"echo": self._echo}, code="echo.text = cb_obj.text"))
         self._position: Slider | None = None
         self._play: Toggle | None = None
-        document.title = f"pneumo: {one_line(source.title)}"
+        self._buttons: tuple[Button, ...] = ()
+        furnish(document, source.title)
         document.add_root(self._layout())
         document.add_periodic_callback(self.refresh, REFRESH_MS)
         self.refresh()
 
     def _layout(self) -> Any:
-        plots = gridplot(
-            [self._plot(panel) for panel in PANELS], ncols=2, merge_tools=False, sizing_mode="stretch_width",
-            toolbar_location=None,
-        )  # fmt: skip
-        bar = self._live_bar() if self._controls is not None else self._playback_bar()
+        plots = side_by_side([self._plot(panel) for panel in PANELS])
+        live = self._controls is not None
+        bar = self._live_bar() if live else self._playback_bar()
+        below = [self._folded_gains()] if live else []
         return column(
-            self._status, bar, plots, self._event_table(), self._beat, self._echo, sizing_mode="stretch_width"
+            self._status, bar, plots, self._event_table(), *below, self._beat, self._echo, sizing_mode="stretch_width"
         )
 
     def _plot(self, panel: Panel) -> Any:
@@ -122,10 +123,10 @@ class Page:
         self._position = Slider(start=0.0, end=length, value=0.0, step=length / 1000, title="time (s)", name="position")
         # Only the viewer's hand moves playback: the refresh sets `value` too, but never `value_throttled`.
         self._position.on_change("value_throttled", lambda _, __, new: source.seek(new))
-        back, ahead = (Button(label=text, width=60) for text in ("< 20 ms", "20 ms >"))
+        back, ahead = (Button(label=text, width=80) for text in ("< 20 ms", "20 ms >"))
         back.on_click(lambda: source.step(-0.02))
         ahead.on_click(lambda: source.step(0.02))
-        return row(play, loop, speed, back, ahead, self._position)
+        return wrapping(play, loop, speed, back, ahead, self._position)
 
     # -- live ------------------------------------------------------------------------------------------------------
 
@@ -134,9 +135,17 @@ class Page:
         assert controls is not None
         stop = Button(label="EMERGENCY STOP", button_type="danger", width=220, height=60, name="estop")
         stop.on_click(controls.estop)
-        reset = Button(label="Release stop", width=110, name="reset")
+        reset = Button(label="Release stop", width=110, height=60, name="reset")
         reset.on_click(controls.reset)
-        return row(column(stop, reset, self._answers), self._gains)
+        self._buttons = (stop, reset)
+        return wrapping(stop, reset, self._answers, sizing_mode="stretch_width")
+
+    def _folded_gains(self) -> Any:
+        """The pictures come first: parameters are shown when they are asked for; the browser does it alone."""
+        fold = Toggle(label="Parameters", active=False, width=220, name="fold")
+        fold.js_on_change("active", CustomJS(args={"gains": self._gains}, code="gains.visible = cb_obj.active"))
+        self._gains.visible = False
+        return column(fold, self._gains, sizing_mode="stretch_width")
 
     def _show_gains(self) -> None:
         """Widgets for the live parameters, once their nodes have said what they are."""
@@ -146,10 +155,11 @@ class Page:
             return
         self._known = found
         widgets = [self._widget(control) for control in found]
-        self._gains.children = [row(*widgets[i : i + 5]) for i in range(0, len(widgets), 5)]
+        self._gains.children = [wrapping(*widgets, sizing_mode="stretch_width")]
 
     def _widget(self, control: Control) -> Any:
-        title, name = one_line(f"{control.node}.{control.name}"), f"set-{control.node}-{control.name}"
+        unit = f" ({control.unit})" if control.unit else ""
+        title, name = one_line(f"{control.node}.{control.name}{unit}"), f"set-{control.node}-{control.name}"
         if control.choices:
             widget: Any = Select(title=title, value=str(control.value), options=list(control.choices), name=name)
         elif isinstance(control.value, bool):
@@ -195,6 +205,8 @@ class Page:
                 self._position.value = round(shown, 3)
                 self._play.active = status.state == "playing"
             if self._controls is not None:
+                for button in self._buttons:  # they end with their session: nobody would hear them
+                    button.disabled = status.state == "ended"
                 self._show_gains()
                 self._show_answers()
         finally:

@@ -39,9 +39,9 @@ class _Guarded(BokehTornado):
         own = None if self.guard is None else delegate(self, request, self.guard)
         return super().find_handler(request, **options) if own is None else own
 
-    def viewers(self) -> int:
-        """Tabs that are open."""
-        return len(self.get_sessions("/"))
+    def viewers(self) -> set[str]:
+        """Sessions of the tabs that are open."""
+        return {session.id for session in self.get_sessions("/")}
 
 
 @dataclass(frozen=True)

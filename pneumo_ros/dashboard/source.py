@@ -65,6 +65,11 @@ class Control:
     high: float
     choices: tuple[str, ...] = ()
 
+    @property
+    def unit(self) -> str:
+        """As the node's description ends with it, in brackets; '' for words and flags."""
+        return self.description.rpartition("[")[2].rstrip("]") if self.description.endswith("]") else ""
+
 
 class Controls(Protocol):
     """What the viewer may do to a running session. Nothing blocks; answers come through :meth:`answers`."""

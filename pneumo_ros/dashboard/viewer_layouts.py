@@ -16,6 +16,8 @@ from pneumo_ros.dashboard.panels import FRONT, PANELS, REAR, Line, Panel
 from pneumo_ros.log import topics
 
 TAB = "half-car rig"
+RESIDUAL = "residual"
+RUNS = {"measured": "#999999", "nominal": "#1f77b4", "refit": "#9467bd", "corrected": "#2ca02c", RESIDUAL: "#d62728"}
 _RAW = (
     Panel("tyre force (N), simulation only", (
         Line("front", topics.TRUTH.name, "front_tyre_force", 1.0, FRONT),
@@ -44,14 +46,40 @@ def recorded_panels() -> tuple[Panel, ...]:
     return (*kept, *_RAW)
 
 
+def residual_panels() -> tuple[Panel, ...]:
+    """What a diagnosis leaves (residual.mcap): each channel's runs over each other, then what is left."""
+    channels = [(topics.DISPLACEMENT, name) for name in topics.DISPLACEMENT.names]
+    channels += [(topic, topic.names[0]) for topic in (topics.FRONT_PRESSURE, topics.REAR_PRESSURE)]
+    panels = [
+        Panel(f"{_title(topic, name)} ({dict(topic.fields)[name]})", tuple(
+            Line(run, f"/{run}{topic.name}", name, 1.0, RUNS[run]) for run in RUNS if run != RESIDUAL
+        ))
+        for topic, name in channels
+    ]  # fmt: skip
+    colours = (FRONT, REAR, "#2ca02c", "#9467bd", FRONT, REAR)
+    left = [Line(_title(topic, name), f"/{RESIDUAL}{topic.name}", name, 1.0, colour)
+            for (topic, name), colour in zip(channels, colours, strict=True)]  # fmt: skip
+    return (*panels, Panel("what is left (m)", tuple(left[:4])), Panel("what is left (Pa)", tuple(left[4:])))
+
+
+def _title(topic: topics.Topic, name: str) -> str:
+    plain = topic.name.removeprefix("/rig/").replace("/", " ")
+    return name.replace("_", " ") if topic is topics.DISPLACEMENT else plain
+
+
+def recorded(line: Line) -> topics.Topic:
+    """The topic of a session that a line shows, or shows a run of."""
+    return topics.BY_NAME[next(name for name in topics.BY_NAME if line.source.endswith(name))]
+
+
 def unit(line: Line) -> str:
     """SI unit of a line's channel."""
-    return dict(topics.BY_NAME[line.source].fields)[line.channel]
+    return dict(recorded(line).fields)[line.channel]
 
 
-def foxglove_layout() -> str:
+def foxglove_layout(panels: tuple[Panel, ...] | None = None) -> str:
     """A layout file, as Foxglove's "Import from file" takes it."""
-    panels = recorded_panels()
+    panels = recorded_panels() if panels is None else panels
     plots = {f"Plot!pneumo{i}": _foxglove_plot(panel) for i, panel in enumerate(panels)}
     names = list(plots)
     half = (len(names) + 1) // 2
@@ -124,10 +152,10 @@ def _foxglove_plot(panel: Panel) -> dict[str, Any]:
 
 def foxglove_path(line: Line) -> str:
     """Message path of a line: ``/valve/command.position[0]``."""
-    topic = topics.BY_NAME[line.source]
+    topic = recorded(line)
     if topic.type != topics.JOINT:
-        return f"{topic.name}.{line.channel}"
-    return f"{topic.name}.position[{topic.names.index(line.channel)}]"
+        return f"{line.source}.{line.channel}"
+    return f"{line.source}.position[{topic.names.index(line.channel)}]"
 
 
 def _stacked(names: list[str]) -> Any:
@@ -138,12 +166,12 @@ def _stacked(names: list[str]) -> Any:
     return {"first": names[0], "second": _stacked(names[1:]), "direction": "column", "splitPercentage": share}
 
 
-def plotjuggler_layout() -> str:
+def plotjuggler_layout(panels: tuple[Panel, ...] | None = None) -> str:
     """A layout file for PlotJuggler 3."""
     root = ElementTree.Element("root")
     tabs = ElementTree.SubElement(root, "tabbed_widget", {"name": "Main Window", "parent": "main_window"})
     tab = ElementTree.SubElement(tabs, "Tab", tab_name=TAB, containers="1")
-    panels = recorded_panels()
+    panels = recorded_panels() if panels is None else panels
     half = (len(panels) + 1) // 2
     both = _splitter(ElementTree.SubElement(tab, "Container"), "|", 2)
     for column in (panels[:half], panels[half:]):
@@ -171,11 +199,13 @@ def _plotjuggler_plot(parent: ElementTree.Element, panel: Panel) -> None:
 
 def plotjuggler_curve(line: Line) -> str:
     """Curve name of a line: ``/valve/command/front_inlet/position``."""
-    suffix = "/position" if topics.BY_NAME[line.source].type == topics.JOINT else ""
+    suffix = "/position" if recorded(line).type == topics.JOINT else ""
     return f"{line.source}/{line.channel}{suffix}"
 
 
 LAYOUTS = {
     "foxglove.json": foxglove_layout, "foxglove_3d.json": foxglove_3d_layout, "plotjuggler.xml": plotjuggler_layout,
+    "foxglove_residual.json": lambda: foxglove_layout(residual_panels()),
+    "plotjuggler_residual.xml": lambda: plotjuggler_layout(residual_panels()),
 }  # fmt: skip
 """File name below config/layouts/ -> what makes it."""

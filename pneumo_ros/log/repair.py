@@ -20,8 +20,8 @@ class Recovery:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing was lost."""
-        return not self.salvaged.losses and not self.salvaged.lost
+        """Whether nothing was lost, and that can be told."""
+        return not self.salvaged.losses and self.salvaged.lost == 0
 
 
 def recover(source: Path, output: Path, overwrite: bool = False) -> Recovery:

@@ -90,9 +90,14 @@ class Salvaged:
 
     @property
     def lost(self) -> int | None:
-        """Messages lost; an estimate from chunk sizes where the summary is gone, None if even that is impossible."""
+        """Messages lost; an estimate from chunk sizes where the summary is gone, None if even that is impossible.
+
+        It is where nothing carries a checksum either: a message whose frame was spoiled leaves no trace.
+        """
         if self.expected is not None:
             return max(self.expected - self.kept, 0)
+        if self.log.unprotected:
+            return None
         if not self.losses:
             return 0
         lost_bytes = sum(loss.content_bytes for loss in self.losses)

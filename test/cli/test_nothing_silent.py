@@ -81,6 +81,7 @@ def test_hardware_names_its_calibration(tmp_path: Path) -> None:
     assert "hardware needs its own calibration" in said and "appendix_c_corrected" in said
 
 
+@pytest.mark.realtime  # Python itself must be up
 @pytest.mark.parametrize("after", [0.15, 0.6])
 def test_early_ctrl_c_is_one_line(tmp_path: Path, after: float) -> None:
     command = [sys.executable, "-m", "pneumo_ros.cli.main", "run", "--output", str(tmp_path / "x.mcap")]

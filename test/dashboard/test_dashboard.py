@@ -28,7 +28,7 @@ from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
-from pneumo_ros.dashboard.guard import is_loopback
+from pneumo_ros.dashboard.guard import MAX_VIEWERS, is_loopback
 from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
 from pneumo_ros.dashboard.source import Playback
@@ -166,6 +166,28 @@ def test_only_this_computer_and_this_page_with_the_token(log_path: Path) -> None
             assert greeted(bare, origin, kept)
 
 
+def test_web_sockets_of_ones_own_making_open_no_more_tabs_than_pages_do(log_path: Path) -> None:
+    async def opened(url: str, cookie: str) -> list[int]:
+        """Status of each attempt, all of them kept open; 101 for those that were let in."""
+
+        async def one() -> tuple[int, object]:
+            headers = {"Origin": url.rstrip("/"), "Cookie": cookie}
+            token = generate_jwt_token(generate_session_id())
+            request = HTTPRequest(url.replace("http", "ws", 1) + "ws", headers=headers)
+            try:
+                socket = await websocket_connect(request, subprotocols=["bokeh", token])
+                return (101 if await socket.read_message() is not None else 0), socket
+            except HTTPClientError as error:
+                return error.code, None
+
+        return [status for status, _ in [await one() for _ in range(MAX_VIEWERS + 3)]]
+
+    with served(str(log_path)) as (url, _):
+        bare, token = url.split("?token=")
+        assert asyncio.run(opened(bare, f"pneumo_token={token}")) == [101] * MAX_VIEWERS + [503] * 3
+        assert fetch(bare, Cookie=f"pneumo_token={token}") == 503
+
+
 @pytest.mark.realtime
 @pytest.mark.slow
 def test_a_log_plays_in_the_browser(log_path: Path) -> None:
@@ -177,6 +199,33 @@ def test_a_log_plays_in_the_browser(log_path: Path) -> None:
         tab.click("Play / pause")
         tab.wait(lambda: "paused" in tab.model("status", "text"), "playback to pause")
         assert "a.mcap" in tab.driver.title
+
+
+_PLOTS = """
+const lefts = [];
+function walk(root) {
+  for (const e of root.querySelectorAll('*')) {
+    if (e.classList.contains('bk-Figure') && e.offsetWidth) lefts.push(Math.round(e.getBoundingClientRect().left));
+    if (e.shadowRoot) walk(e.shadowRoot);
+  }
+}
+walk(document); return [document.documentElement.scrollWidth, lefts];
+"""
+
+
+@pytest.mark.realtime
+@pytest.mark.slow
+@pytest.mark.parametrize("overlay", [False, True])
+def test_pages_fit_a_telephone_and_a_screen(log_path: Path, overlay: bool) -> None:
+    """One column of plots at 390 px, two at 1280 px, and nothing to be pushed sideways; every tab gets its own page."""
+    with served(str(log_path), *(("--with", str(log_path)) if overlay else ())) as (url, _), browser() as tab:
+        for width, columns in ((390, 1), (1280, 2)):
+            size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+            tab.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+            tab.driver.get(url)
+            tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "plots to be drawn")
+            across, lefts = tab.driver.execute_script(_PLOTS)
+            assert across <= width and len(lefts) >= 6 and len(set(lefts)) == columns
 
 
 def line_with(words: str, stream: IO[str], seconds: float) -> bool:
@@ -206,10 +255,15 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.click("EMERGENCY STOP")
         tab.wait(lambda: "emergency stop: done" in tab.model("answers", "text"), "the stop to be confirmed")
         tab.wait(lambda: tab.model("set-controller-pole", "value"), "the gains")
+        assert tab.model("set-controller-pole", "title") == "controller.pole (1/s)"
+        assert tab.model("gains", "visible") is False  # the pictures come first
+        tab.click("Parameters")
+        tab.wait(lambda: tab.model("gains", "visible"), "the parameters to unfold")
         tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
         tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
         os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)
         tab.wait(lambda: "cut short" in tab.model("status", "text"), "the session's end", 60)
+        tab.wait(lambda: tab.model("estop", "disabled"), "the red button to end with its session")
         tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
         assert process.poll() is None and process.stdout is not None
         assert line_with("the dashboard stays", process.stdout, 60.0)

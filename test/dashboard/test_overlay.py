@@ -12,7 +12,7 @@ from bokeh.models import CheckboxButtonGroup, CrosshairTool, Legend, Select, Tab
 from helpers.rig_logs import noisy, simulated, write_log
 from helpers.small_logs import STRING, text, write
 
-from pneumo_ros.dashboard.overlay import CHANNELS, Overlay, is_residual, series_of
+from pneumo_ros.dashboard.overlay import CHANNELS, Overlay, is_residual, remainders, series_of
 from pneumo_ros.dashboard.source import Playback
 from pneumo_ros.diagnosis.report.residual_log import write_residual_log
 from pneumo_ros.diagnosis.signals import read_signals
@@ -38,6 +38,9 @@ def test_a_residual_log_shows_every_run(tmp_path: Path, session: Path) -> None:
     assert [one.name for one in series] == ["measured", "nominal", "refit", "corrected", "residual"]
     np.testing.assert_allclose(series[1].values[:, 0] - series[0].values[:, 0], 1.0, atol=1e-9)  # mm
     assert np.abs(series[-1].values).max() < 1e-9
+    left = remainders(series[:-1])
+    assert [one.name for one in left] == ["measured - nominal", "measured - refit", "measured - corrected"]
+    np.testing.assert_allclose(left[0].values[:, 0], -1.0, atol=1e-9)
 
 
 def test_two_sessions_meet_on_their_road(tmp_path: Path, session: Path) -> None:
@@ -55,12 +58,18 @@ def test_the_page_has_what_comparing_needs(session: Path) -> None:
     document = Document()
     Overlay(document, "two", series_of(log, log))
     root = document.roots[0]
-    assert {str(tab.title) for tab in root.select({"type": TabPanel})} == {"over time", "spectrum", "XY"}
-    assert len(list(root.select({"type": CrosshairTool}))) == 13
-    assert len(list(root.select({"type": WheelZoomTool}))) == 13
+    assert {str(tab.title) for tab in root.select({"type": TabPanel})} == {
+        "over time",
+        "residual",
+        "spectrum",
+        "XY",
+    }
+    assert len(list(root.select({"type": CrosshairTool}))) == 19
+    assert len(list(root.select({"type": WheelZoomTool}))) == 19
+    Overlay(Document(), "another tab", series_of(log, log))  # a model belongs to one document
     assert all(legend.click_policy == "hide" for legend in root.select({"type": Legend}))
-    chooser = root.select_one({"type": CheckboxButtonGroup})
-    assert chooser is not None and len(chooser.labels) == len(CHANNELS)
+    choosers = list(root.select({"type": CheckboxButtonGroup}))
+    assert [len(chooser.labels) for chooser in choosers] == [len(CHANNELS)] * 2
     across = root.select_one({"type": Select, "name": "x"})
     assert across is not None
     across.value = "front_pressure"

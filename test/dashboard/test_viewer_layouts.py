@@ -5,13 +5,17 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from helpers.folders import CONFIG
+from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS, recorded_panels
+from pneumo_ros.diagnosis.report import write_residual_log
 from pneumo_ros.log import topics
+from pneumo_ros.log.reading import read_log
 
 FOLDER = CONFIG / "layouts"
 
@@ -43,6 +47,22 @@ def test_the_3d_layout_shows_the_description_and_its_joints() -> None:
     assert shown["topics"] == {topics.ROBOT_DESCRIPTION.name: {"visible": True}} and shown["followTf"] == "ground"
     paths = [path["value"] for path in layout["configById"]["Plot!pneumo"]["paths"]]
     assert paths == [f"/joint_states.position[{i}]" for i in range(4)]
+
+
+def test_layouts_of_the_residual_name_what_a_diagnosis_writes(tmp_path: Path) -> None:
+    clean, road, commands = simulated(4.0, 1)
+    held = signals_of(clean, road, commands, 1, "held.mcap")
+    write_residual_log(tmp_path / "residual.mcap", held, dict.fromkeys(("nominal", "refit", "best"), clean))
+    log = read_log(tmp_path / "residual.mcap")
+    layout = json.loads(LAYOUTS["foxglove_residual.json"]())
+    paths = [path["value"] for plot in layout["configById"].values() for path in plot["paths"]]
+    assert len(paths) == len(set(paths)) == 6 * 4 + 6
+    assert {path.split(".")[0] for path in paths} <= set(log.topics)
+    curves = [
+        c.get("name", "") for c in ElementTree.fromstring(LAYOUTS["plotjuggler_residual.xml"]().encode()).iter("curve")
+    ]
+    assert len(curves) == len(paths)
+    assert all(any(curve.startswith(f"{topic}/") for topic in log.topics) for curve in curves)
 
 
 def test_plotjuggler_curves_name_recorded_channels() -> None:

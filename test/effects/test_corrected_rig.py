@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.own_logs import QUICK
 from helpers.rig_logs import signals_of, simulated
 from helpers.sessions import run
 
@@ -274,7 +275,7 @@ def test_a_session_of_a_corrected_rig_is_diagnosed_as_what_it_is(tmp_path: Path)
     again = rerun(read_log(logs[0]), build=stepped_rig)
     assert "valve_lag (rear)" in again.notes[0]
     assert all(row[-1] < 0.01 for row in compare_channels(again))
-    found = prepared(logs[:1], logs[1], NOMINAL).diagnose(Options(pairs=False))
+    found = prepared(logs[:1], logs[1], NOMINAL).diagnose(Options(effort=QUICK, pairs=False))
     best = found.ranking[0]
     assert found.verdict == "valve_lag" and best.side == "rear" and best.shrink > 0.95
     assert best.parameters["valve_lag"].value == pytest.approx(0.015, rel=0.01)

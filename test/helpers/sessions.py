@@ -51,6 +51,11 @@ def _locked(path: Path) -> int | None:
     return descriptor
 
 
+def environment() -> dict[str, str]:
+    """Of a command whose words are read as on a terminal of 80 columns."""
+    return {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "MPLBACKEND": "Agg", "COLUMNS": "80"}
+
+
 def start(*options: str, domain: int | None = None) -> subprocess.Popen[str]:
     """`pneumo run` with options, in a domain of its own; -1 for the one that the options ask for."""
     domain = own_domain() if domain is None else domain

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from helpers.small_logs import session, write
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.repair import recover
 from pneumo_ros.log.salvage import salvage
 
 CUTS, FLIPS = 1000, 1000
@@ -108,3 +110,19 @@ def test_other_containers_give_no_traceback(tmp_path: Path, options: dict[str, o
                     assert "\n" not in str(error)
     for place in rng.choice(len(data), 100, replace=False):
         check(tmp_path / "c.mcap", data[:place], truth, may_read=False)
+
+
+def test_a_loss_that_nothing_tells_of_is_not_called_none(tmp_path: Path) -> None:
+    """Neither checksums nor a summary: a message whose opcode was spoiled is gone without a trace."""
+    path = write(tmp_path / "a.mcap", session(40), use_chunking=False, enable_crcs=False)
+    data = path.read_bytes()
+    total = sum(map(len, contents(read_log(path)).values()))
+    (summary,) = struct.unpack_from("<Q", data, len(data) - 28)
+    cut = bytearray(data[: summary - 13])  # without the end of data, as a killed recorder leaves it
+    length = 22 + len(read_log(path).records("/rig/displacement").message(3))
+    frame = cut.index(struct.pack("<BQ", 5, length))
+    cut[frame] |= 0x80  # an opcode of nobody's
+    (tmp_path / "b.mcap").write_bytes(bytes(cut))
+    found = recover(tmp_path / "b.mcap", tmp_path / "c.mcap")
+    assert found.kept == total - 1 and not found.salvaged.losses
+    assert found.salvaged.lost is None and not found.whole

@@ -217,16 +217,17 @@ def _sides(entry: Mapping[str, Any]) -> str:
 
 
 def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str, Any]:
-    low, high = entry["shrink_ci90"]
+    low, high = (float(one or 0.0) for one in entry["shrink_ci90"])
+    lost = entry["gap_after"] is None  # it ran away on the held-out log
     return {
         "name": " + ".join(effect_name(effect) for effect in entry["effects"]),
         "ids": ", ".join(entry["effects"]),
         "side": _sides(entry),
         "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
         "probability": float(entry["probability"]),
-        "gap": float(entry["gap_after"]),
-        "shrink": percent(entry["shrink"]),
-        "bar": shrink_bar(entry["shrink"], (low, high)),
+        "gap": float("inf") if lost else float(entry["gap_after"]),
+        "shrink": "ran away" if lost else percent(entry["shrink"]),
+        "bar": shrink_bar(float(entry["shrink"] or 0.0), (low, high)),
     }
 
 

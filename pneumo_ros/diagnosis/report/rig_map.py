@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 WIDTH, HEIGHT = 640, 400
-MARGIN = 90  # for labels beside the rig
+MARGIN = 10  # for labels beside the rig
 FRONT, REAR = 200.0, 440.0  # x of the axles; the front is on the left
 BODY_TOP, BODY_BOTTOM = 118.0, 150.0
 SPRING_BOTTOM, AXLE_BOTTOM = 232.0, 254.0
@@ -63,8 +63,7 @@ def _label(part: Part, share: float) -> str:
     return (
         f'<line x1="{x}" y1="{y}" x2="{tx}" y2="{ty}" stroke="#212529"/>'
         f'<circle cx="{x}" cy="{y}" r="2.5" fill="#212529"/>'
-        f'<text class="share" x="{tx + shift}" y="{ty + 4}" text-anchor="{anchor}">{100 * share:.0f} %</text>'
-        f'<text class="name" x="{tx + shift}" y="{ty + 20}" text-anchor="{anchor}">{part.title}</text>'
+        f'<text class="share" x="{tx + shift}" y="{ty + 10}" text-anchor="{anchor}">{100 * share:.0f} %</text>'
     )
 
 

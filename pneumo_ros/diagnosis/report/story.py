@@ -164,17 +164,23 @@ def places(summary: Mapping[str, Any]) -> str:
     found = [(str(e["place"]), float(e["share"])) for e in summary.get("location") or []]
     shown = [(place, share) for place, share in found if share >= STANDS_OUT]
     shares = whole_percents([share for _, share in shown])
-    return ", ".join(f"{place_words(place)} {share} %" for (place, _), share in zip(shown, shares, strict=True)) or (
-        "no place stands out")  # fmt: skip
+    if not shown:
+        return "no place stands out"
+    words = [f"{place_words(place)} {share} %" for (place, _), share in zip(shown, shares, strict=True)]
+    return f"{', '.join(words)} of the gap"
 
 
 def _sizes(summary: Mapping[str, Any]) -> list[str]:
     """Parameters that the log determines; beside a shape the law's own are often not."""
-    found = {
-        n: v for n, v in winner(summary)["parameters"].items() if float(v.get("std") or 0.0) < abs(float(v["value"]))
-    }
+    found = {name: value for name, value in winner(summary)["parameters"].items() if _determined(value)}
     words = [f"{name.replace('_', ' ')} {quantity_words(name, value)}" for name, value in found.items()]
     return words or ["no single number: the law as measured is in the report"]
+
+
+def _determined(quantity: Mapping[str, Any]) -> bool:
+    """Whether its standard deviation is known, and smaller than itself; what is not finite is null in the file."""
+    value, std = quantity["value"], quantity.get("std", 0.0)
+    return value is not None and std is not None and float(std) < abs(float(value))
 
 
 def _mended(found: Sequence[Gain]) -> str:
@@ -264,8 +270,14 @@ def closest(summary: Mapping[str, Any]) -> str:
 
 def nearest(summary: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The named entry of the ranking that leaves least of the held-out gap."""
-    named = [e for e in summary.get("ranking") or [] if set(e["effects"]).isdisjoint(UNNAMED)]
+    entries = summary.get("ranking") or []
+    named = [e for e in entries if set(e["effects"]).isdisjoint(UNNAMED) and _finite(e)]
     return min(named, key=lambda e: float(e["gap_after"]), default=None)
+
+
+def _finite(entry: Mapping[str, Any]) -> bool:
+    """Whether a structure ran through the held-out log; one that ran away has null there."""
+    return entry["gap_after"] is not None and entry["shrink"] is not None
 
 
 def why_not(summary: Mapping[str, Any]) -> str:
@@ -319,7 +331,7 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
     """What became of an effect that competed."""
     if name in str(summary["verdict"]).split("+"):
         return f"{name} is the verdict"
-    entries = [e for e in summary.get("ranking") or [] if name in e["effects"]]
+    entries = [e for e in summary.get("ranking") or [] if name in e["effects"] and _finite(e)]
     if entries:
         best = min(entries, key=lambda e: float(e["gap_after"]))
         return (f"{structure_words(best)} was fitted and closes {percent(max(float(best['shrink']), 0.0))} of the "
@@ -330,5 +342,7 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
     if tried:
         order = [str(t["candidate"]) for t in summary["tried"]]
         number = order.index(str(tried[0]["candidate"])) + 1
-        return f"{name} was fitted and is number {number} of {len(order)}: {float(tried[0]['gap_fit']):.3g} left"
+        return (
+            f"{name} was fitted and is number {number} of {len(order)}: {float(tried[0]['gap_fit'] or np.inf):.3g} left"
+        )
     return f"{name} promised too little in the first trial to be fitted"

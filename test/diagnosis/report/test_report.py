@@ -275,7 +275,7 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     assert [path.name for path in written] == ["diagnosis.json", "report.html", "residual.mcap"]
     assert sorted((tmp_path / "new").iterdir()) == sorted(written), "nothing else: no .part, no metadata.yaml"
     page = written[1].read_text()
-    assert ("where", "the front air and valve 98 %") in first.facts
+    assert ("where", "the front air and valve 98 % of the gap") in first.facts
     assert dict(first.facts)["how big"] == "leak area 0.4000 ± 0.0010 mm²"
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"
@@ -345,3 +345,21 @@ def test_names_keep_their_letters_and_an_interval_has_two_ends() -> None:
     assert sentence("an effect") == "An effect."
     assert interval(0.96, 0.99) == " (90 % interval 96 % to 99 %)"
     assert interval(0.981, 0.983) == " (90 % interval 98.1 % to 98.3 %)" and interval(0.98, 0.98) == ""
+
+
+def test_what_is_not_finite_is_told_too() -> None:
+    """diagnosis.json has null where a run diverged or a parameter is not determined."""
+    lost = {"effects": ["valve_lag"], "sites": ["rear"], "side": "rear", "probability": 0.0, "gap_after": None,
+            "shrink": None, "shrink_ci90": [None, None], "parameters": {}}  # fmt: skip
+    found = findings("unknown")
+    summary = {**found.summary, "ranking": [*found.summary["ranking"], lost], "evidence": {},
+               "tried": [{"candidate": "mine:rear", "gap_fit": None}]}  # fmt: skip
+    assert ">ran away<" in render(replace(found, summary=summary))
+    facts = dict(story(summary, Known(LIBRARY, own=("mine", "valve_lag"))).facts)
+    assert facts["closest"].startswith("leak") and "inf left" in facts["your effect"]
+    loose = {
+        **findings().summary["ranking"][0],
+        "parameters": {"leak_area": {"value": 4e-7, "std": None, "unit": "m2"}},
+    }
+    said = story({**findings().summary, "ranking": [loose]}, Known(LIBRARY))
+    assert dict(said.facts)["how big"].startswith("no single number")
