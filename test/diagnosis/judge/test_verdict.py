@@ -91,6 +91,26 @@ def test_named_and_unnamed_stand_beside_each_other() -> None:
     assert found.verdict == "leak" and found.effects["leak", "front"] > 0.9 > 0.5 > found.effects["bump_stop", "front"]
 
 
+def test_what_the_held_out_log_does_not_miss_takes_no_name_from_another() -> None:
+    """A further effect that only the fitted logs wanted: nothing is left above noise and form without it."""
+    refit, chosen = scored(17.0, 1200.0), scored(0.16, -1150.0, "leak", "relaxation", unknowns=33)
+    found = [EffectEvidence(law, ("front_air",), *squares, share=share) for law, squares, share in zip(
+        chosen.fit.candidate.laws, ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.4, 0.5), strict=True)]  # fmt: skip
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(8.0, 0.8), found)
+    assert told.verdict == "leak" and told.probability > 0.9
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.06, True), (0.3, False)])
+def test_a_family_may_leave_twice_what_anything_leaves_where_a_form_is_stated(left: float, named: bool) -> None:
+    """Closing most of what can be closed is not enough for a name: a wrong law may do that."""
+    refit, chosen = scored(17.0, 1200.0), scored(0.16, -1150.0, "viscous_damping", unknowns=32)
+    one = EffectEvidence(chosen.fit.candidate.laws[0], ("front_force",), 1.0, left**2, 0.0, floor=0.05)
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, left / 0.05, 1.0), [one])
+    assert (told.verdict == "viscous_damping") is named
+    unstated = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, left / 0.05), [replace(one, floor=0.0)])
+    assert unstated.verdict == "viscous_damping"
+
+
 def test_no_small_name_stands_beside_something_larger_without_one() -> None:
     """At the same place; elsewhere it does."""
     refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "bump_stop", unknowns=36)
