@@ -20,8 +20,15 @@ def record(measured: Any) -> Any:
     return SimpleNamespace(name="log", period=0.01, measured=measured, weight=np.ones(np.shape(measured)))
 
 
-@pytest.mark.parametrize(("measured", "told"), [(GOOD[:, 0], "no table"), (np.ones((100, 2)), "no table"),
-                                                (GOOD[:3], "too few rows"), (GOOD * np.nan, "not everywhere a number")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("measured", "told"),
+    [
+        (GOOD[:, 0], "no table"),
+        (np.ones((100, 2)), "no table"),
+        (GOOD[:3], "too few rows"),
+        (GOOD * np.nan, "not everywhere a number"),
+    ],
+)
 def test_a_record_of_another_shape_is_refused(measured: Any, told: str) -> None:
     model: Any = SimpleNamespace(channels=("x",))
     for logs, held in (([record(measured)], record(GOOD)), ([record(GOOD)], record(measured))):
