@@ -18,6 +18,7 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
+from pneumo_ros.diagnosis.search.screening import SENSOR
 from pneumo_ros.diagnosis.search.selection import Scored
 from pneumo_ros.effects.parameters import family_of
 
@@ -142,11 +143,14 @@ def judge(
 
 def _beside_unnamed(trust: Mapping[Part, float], evidence: Sequence[EffectEvidence]) -> dict[Part, float]:
     """No name stands where something larger acts at the same place that is not what it was called: the smaller one may
-    be the rest of it. What nobody misses on the held-out log, above noise and form, acts nowhere."""
+    be the rest of it. A sensor's error stands beside no such thing anywhere: what moves the rig looks like one. What
+    nobody misses on the held-out log, above noise and form, acts nowhere."""
     out = dict(trust)
     for one in evidence:
-        larger = [e for e in evidence if e.share > one.share and e.places[:1] == one.places[:1] and e.without > 0.0]
-        out[one.law] = min([trust[one.law], *(trust[e.law] for e in larger)])
+        sensor = one.places[0].startswith(SENSOR)
+        beside = [e for e in evidence if sensor or e.places[:1] == one.places[:1]]
+        larger = [e.law for e in beside if e.share > one.share and e.without > 0.0]
+        out[one.law] = min([trust[one.law], *(trust[law] for law in larger)])
     return out
 
 

@@ -123,6 +123,9 @@ def test_no_small_name_stands_beside_something_larger_without_one() -> None:
         large = replace(bent, share=share, places=(place,))
         effects = [replace(good, share=0.4), large]
         assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects).verdict == verdict
+    sensor = replace(good, share=0.4, places=("sensor:sprung_front",))
+    elsewhere = replace(bent, share=0.9, places=("rear_air",))
+    assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), [sensor, elsewhere]).verdict == "unknown"
 
 
 def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:
