@@ -12,7 +12,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
 LONGEST = 60  # fit samples over which the residual's correlation is summed
 TRUE_TO = 2e-3
@@ -113,7 +113,8 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
 def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -> float:
     """How many parameters of its effects, or of some parts, ended at an end of their allowed range.
 
-    A size counts whole: nothing of the kind is so large. What a law only shapes counts half: another law may bend it.
+    A size counts whole: nothing of the kind is so large. What only shapes a law counts half, another law may bend it;
+    and so does a law's size beside its family's shape, which can do the same and may push it anywhere.
     """
     free, values, found = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x), 0.0
     first = 0
@@ -121,7 +122,8 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
         own = problem.effect_parameters(Candidate((part,)))
         stuck = [p for k, p in enumerate(own, first) if not free[k] and not _natural(p, values[k])]
         if parts is None or part in parts:
-            found += sum(1.0 if p.size else 0.5 for p in stuck)
+            beside = is_law(part[0]) and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
+            found += sum(1.0 if p.size and not beside else 0.5 for p in stuck)
         first += len(own)
     return found
 
