@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Laws and atoms of a flow slot: leaks, errors of an orifice, relief, droop, heat. Layout as in :mod:`.force`.
+"""Laws and atoms of a flow slot: leaks, errors of an orifice, relief, droop, heat; as :mod:`pneumo_ros.slots.force`.
 
 ``c`` are the coordinates (pressure or level up, down, nominal flow). A gas chokes: its flow through a hole goes with
 the upper pressure alone below the critical ratio (ISO 6358); through a long gap it goes with the difference of squares.
