@@ -126,6 +126,13 @@ class Problem:
         return np.vstack(out)
 
     @cached_property
+    def expected(self) -> Array:
+        """(n, C) what noise and the model form that a rig's maker states leave; the noise where none is stated."""
+        stated = [getattr(r, "model_form", 0.0) * scale_of(r) for r in self.records]
+        rows = [np.tile(s, (len(n), 1)) for s, n in zip(stated, self._real, strict=True)]
+        return np.hypot(self.noise, np.vstack(rows))
+
+    @cached_property
     def _real(self) -> list[Array]:
         """For each log (n, averaged, C): 1 where a real sample stands behind the row's value."""
         return [grouped(np.asarray(r.weight), self.averaged) for r in self.records]

@@ -131,9 +131,9 @@ def score(problem: Problem, fit: Fit) -> Scored:
 
 
 def noise_level(problem: Problem) -> float:
-    """What white sensor noise alone leaves of the mean square: less than one, sigmas hold a floor for model form."""
+    """What sensor noise and a stated model form leave of the mean square: less than one, sigmas hold a floor beside."""
     there = problem.weight > 0.0
-    return float(np.sum((problem.weight * problem.noise) ** 2) / max(1, there.sum()))
+    return float(np.sum((problem.weight * problem.expected) ** 2) / max(1, there.sum()))
 
 
 def advantage(poorer: Scored, richer: Scored) -> float:
