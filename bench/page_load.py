@@ -63,6 +63,8 @@ class Load:
                 request = HTTPRequest(f"http://{self.place}/", headers={"Cookie": self.cookie}, request_timeout=60.0)
                 answer = await AsyncHTTPClient().fetch(request, raise_error=False)
                 self.outcomes[f"page {answer.code}"] += 1
+            except HTTPClientError as error:  # cut off
+                self.outcomes[f"page {error.code}"] += 1
             except OSError:
                 return
             await asyncio.sleep(1.0)

@@ -122,12 +122,17 @@ def align(first: Log, second: Log) -> tuple[str, float]:
     return "same", lag * ROAD_STEP
 
 
+LONGEST_ROAD = 86400.0  # s; what claims to be longer is not laid over another
+
+
 def _road(log: Log) -> NDArray[np.float64]:
     """The front road from the log's start on an even base of :data:`ROAD_STEP`."""
     if ROAD.name not in log.topics or log.topics[ROAD.name].count < MIN_ROAD:
         return np.empty(0)
     joint = log.select(ROAD.name, ["front"])
     time = (joint.stamp_ns - start_of(log)) * 1e-9
+    if not 0.0 < time[-1] < LONGEST_ROAD:  # a stamp may say anything
+        return np.empty(0)
     grid = np.arange(0.0, time[-1], ROAD_STEP)
     return np.asarray(np.interp(grid, time, np.nan_to_num(joint.position[:, 0])))
 
