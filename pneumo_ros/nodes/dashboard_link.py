@@ -13,6 +13,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -38,6 +39,7 @@ from pneumo_ros.rig import Rig, load_rig, parse_rig
 
 NODE_NAME = "dashboard"
 QUIET = 1.5  # s without a sample after which the session is taken to be over or not there
+STOP_HEARD = 1.0  # s at most that closing waits for a stop to be acknowledged
 TUNABLE = ("controller", "estimator")
 LOOK_PERIOD = 1.0  # s between looks for the parameters of a node that has not answered yet
 _ENDING = ("session_complete", "session_stopped", "node_died")
@@ -87,6 +89,8 @@ class LiveLink:
     def __exit__(self, *_: object) -> None:
         self._running = False
         self._thread.join()
+        # A page that is closed right after its red button was pressed: the stop must have reached who listens.
+        self._stop_topic.wait_for_all_acked(Duration(seconds=STOP_HEARD))
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
