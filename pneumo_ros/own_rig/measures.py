@@ -29,7 +29,6 @@ SEARCHES = 12  # steps in the search of a size
 FINEST, MOST_STEPS = 0.7, 40  # rad in a sub-step; sub-steps in a period
 FOR_FRICTION = 2  # sub-steps that friction alone is given: beyond them its turnover is widened
 NARROW = 0.04  # of the usual rate: what friction may turn over within
-UNIT = {"m": "m", "Pa": "Pa"}
 
 
 @dataclass(frozen=True)

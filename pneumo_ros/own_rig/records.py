@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -268,8 +267,3 @@ def first_values(record: OwnRecord, column: Array, noise: float) -> tuple[Array,
     std = max(noise, left) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
     scale = np.array([1.0, 1.0 / max(t[-1], 1e-12)])
     return np.asarray(coefficients[:2] * scale), np.asarray(std[:2] * scale)
-
-
-def joined_noise(records: Sequence[OwnRecord]) -> Array:
-    """(C,) the largest noise of several logs."""
-    return np.asarray(np.max([r.noise for r in records], axis=0))

@@ -93,10 +93,6 @@ def _rate(m: Measures) -> float:
     return m.rate
 
 
-def _travel(m: Measures) -> float:
-    return m.travel
-
-
 def _share(m: Measures) -> float:
     return m.size / m.load
 

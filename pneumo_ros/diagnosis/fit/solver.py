@@ -7,7 +7,8 @@ weight of thousands of samples, and one that fits to the noise is held by the da
 down-weighted (Huber) at a threshold that follows the misfit.
 
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
-between candidates and are taken over from the refit until a step disappoints.
+between candidates and are taken over from the refit for the first step. A step that keeps its promise carries them on
+by a secant; after one that does not they are taken anew.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ def fit(
     start : scaled unknowns
     jacobian : (n, C, >= shared) sensitivities whose first columns serve the first step
     rows : fitted samples; the problem's by default
-    probe : borrow those columns for every step: a tenth of the cost, for a first look at a candidate
+    probe : never take the borrowed columns anew: a tenth of the cost, for a first look at a candidate
     shared : how many of them are of the same unknowns; by default the fixed ones, more where the candidate is the
         jacobian's own with further parts
     """
@@ -135,7 +136,7 @@ def fit(
 def secant(columns: Array, moved: Array, change: Array) -> Array:
     """Sensitivities (n, C, m) brought up to date by a step (m,) and the change of the residual it made (n, C).
 
-    The smallest correction that reproduces the step (Broyden 1965, Math. Comp. 19, 577-593, update 4.5); it costs no
+    The smallest correction that reproduces the step (Broyden 1965, Math. Comp. 19, 577-593); it costs no
     simulation.
     """
     wrong = change - columns @ moved

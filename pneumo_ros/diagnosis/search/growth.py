@@ -207,11 +207,8 @@ def _exchanged(contest: Contest, found: Fit, bare: Fit, law: Part) -> Fit:
     problem, effort = contest.problem, contest.effort
     bare = refreshed(problem, bare)
     others = bare.candidate.laws
-    rivals = [
-        p
-        for p in all_parts(problem)
-        if _rival(problem, law, p) and all(compatible(problem.model, o, p) for o in others)
-    ]
+    able = (p for p in all_parts(problem) if all(compatible(problem.model, other, p) for other in others))
+    rivals = [part for part in able if _rival(problem, law, part)]
     promised = promises(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(contest, bare, probed(problem, bare, promised)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)
