@@ -58,7 +58,7 @@ def nodes(context: LaunchContext) -> list[object]:
     namespace = "/" + given["namespace"].strip("/") if given["namespace"].strip("/") else ""
     folder = given["log_folder"] or str(Path("sessions") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S"))
     log = Path(folder) / "session.mcap"
-    _claims.append(claim_place(None, namespace, False, f"launched, {given['source']}, {log}"))
+    _claims.append(claim_place(None, namespace, False, f"launched, {given['source']}, {log}", valves=source != "plant"))
     names = ["road_profile", source, "estimator", "controller", "session_recorder"]
     identity = uuid.uuid4().hex
     common = {

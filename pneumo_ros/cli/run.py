@@ -139,7 +139,7 @@ def run(
     if use_sim_time:
         for own in values.values():
             own["use_sim_time"] = True
-    with _alone(domain, place, isolate, f"{source}, {target}") as claim:
+    with _alone(domain, place, isolate, source, target) as claim:
         if isolate:
             console.print(f"isolated in domain {claim.domain}")
         with beside(claim.domain, place) if view else nullcontext() as dashboard:
@@ -160,13 +160,13 @@ def _namespace(text: str) -> str:
 
 
 @contextmanager
-def _alone(domain: int | None, namespace: str, isolate: bool, what: str) -> Iterator[Claim]:
+def _alone(domain: int | None, namespace: str, isolate: bool, source: str, target: Path) -> Iterator[Claim]:
     """A place in the ROS graph where no other session is; nothing is started before that is known."""
     from pneumo_ros.nodes.neighbours import claim_place
 
     # A session stays on this computer unless the user opened it to the network.
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    claim = claim_place(domain, namespace, isolate, what)
+    claim = claim_place(domain, namespace, isolate, f"{source}, {target}", valves=source == "serial")
     try:
         yield claim
     finally:
