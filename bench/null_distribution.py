@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.search.competition import Contest, Effort, compete
+from pneumo_ros.diagnosis.search.competition import Effort, Search, compete
 from pneumo_ros.diagnosis.search.selection import Scored, advantage, score
 from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.effects.parameters import Active
@@ -105,9 +105,9 @@ def win(poorer: Scored, richer: Scored) -> tuple[float, float, float, float]:
     )
 
 
-def best_of(contest: Contest, size: int) -> Scored | None:
+def best_of(search: Search, size: int) -> Scored | None:
     """The structure of that many effects with the lowest level on the selection blocks."""
-    scored = [score(contest.problem, f) for f in contest.finalists if len(f.candidate.laws) == size]
+    scored = [score(search.problem, f) for f in search.finalists if len(f.candidate.laws) == size]
     return min(scored, key=lambda s: s.level, default=None)
 
 
@@ -124,9 +124,9 @@ def main() -> None:
         nuisance, effect = drawn(model, rng), drawn_effect(model, rng)
         for truth in ((), (effect,)):
             log = make_log(model, nuisance, truth, seed)
-            contest = compete(Problem(model, (log,)), Effort(), bool(truth), lambda share, what: None)
-            poorer = score(contest.problem, contest.refit) if not truth else best_of(contest, 1)
-            richer = best_of(contest, len(truth) + 1)
+            search = compete(Problem(model, (log,)), Effort(), bool(truth), lambda share, what: None)
+            poorer = score(search.problem, search.refit) if not truth else best_of(search, 1)
+            richer = best_of(search, len(truth) + 1)
             if poorer is None or richer is None:
                 continue
             label = " ".join(f"{a.effect}:{a.site}" for a in truth) or "none"

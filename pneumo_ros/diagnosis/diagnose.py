@@ -24,7 +24,7 @@ from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
-from pneumo_ros.diagnosis.search.competition import Contest, Effort, Progress, compete
+from pneumo_ros.diagnosis.search.competition import Effort, Progress, Search, compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
@@ -85,10 +85,10 @@ def diagnose(
     _check_records(model, [*fit_logs, holdout])
     options = options or Options()
     tell = progress or (lambda share, what: None)
-    contest = compete(Problem(model, tuple(fit_logs), threads=options.threads), options.effort, options.pairs, tell)
-    grow(contest, options.limits, options.pairs)
+    search = compete(Problem(model, tuple(fit_logs), threads=options.threads), options.effort, options.pairs, tell)
+    grow(search, options.limits, options.pairs)
     tell(0.9, "selecting and checking on the held-out log")
-    outcome = _outcome(contest, holdout, options, tell)
+    outcome = _outcome(search, holdout, options, tell)
     held, evidence = _on_held_out(outcome), _weighed(outcome)
     opinion = judge(outcome.refit, outcome.finalists, outcome.chosen, options.calibration, held, evidence)
     if opinion.verdict == "none":  # what nothing speaks for is not told, and not saved
@@ -116,12 +116,12 @@ def _check_records(model: Model, records: Sequence[Any]) -> None:
                              remedy="fill the gaps and give them no weight")  # fmt: skip
 
 
-def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -> Outcome:
-    problem = contest.problem
-    refit = score(problem, contest.refit)
-    finalists = tuple(score(problem, f) for f in contest.finalists)
+def _outcome(search: Search, holdout: Any, options: Options, tell: Progress) -> Outcome:
+    problem = search.problem
+    refit = score(problem, search.refit)
+    finalists = tuple(score(problem, f) for f in search.finalists)
     everything = np.ones(len(problem.measured), dtype=bool)
-    base = _final(problem, contest.refit, everything)
+    base = _final(problem, search.refit, everything)
     while True:
         chosen = select(refit, finalists, options.limits)
         best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
@@ -133,7 +133,7 @@ def _outcome(contest: Contest, holdout: Any, options: Options, tell: Progress) -
     tell(0.93, "locating")
     floor = total_floor(holdout)
     shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
-    found = Outcome(contest, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), shares, None, None)
+    found = Outcome(search, refit, finalists, chosen, base, best, holdout, runs, Closable((), ()), shares, None, None)
     before, after = _whereabouts(found, options.locate)
     tell(0.94, "what else could be closed")
     rest = after if after is not None else before
@@ -183,7 +183,7 @@ def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
 
 
 def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
-    problem, contest, holdout, best = outcome.problem, outcome.contest, outcome.holdout, outcome.best
+    problem, search, holdout, best = outcome.problem, outcome.search, outcome.holdout, outcome.best
     tell(0.95, "ranking")
     ranking = rank(outcome, opinion)
     group = ambiguity_group(problem, opinion, outcome.finalists)
@@ -196,7 +196,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
     cov = covariance(problem, best)
     shares = budgeted(outcome, opinion, cov)
     tell(1.0, "done")
-    hidden = _hidden(problem, contest)
+    hidden = _hidden(problem, search)
     blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)
     return Diagnosis(
         verdict="not_testable" if blind else opinion.verdict,
@@ -214,9 +214,9 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         not_testable=hidden,
         experiment=None if refused else experiment,
         edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
-        notes=(*_notes(contest, best, problem), *refused),
+        notes=(*_notes(search, best, problem), *refused),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
-        tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*contest.singles, *contest.pairs]),
+        tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*search.singles, *search.pairs]),
         evidence=_evidence(outcome),
         trajectories=_trajectories(holdout, outcome.runs),
     )
@@ -277,7 +277,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
     out = {"level_refit": outcome.refit.level, "level_chosen": chosen.level, "effects": float(chosen.size)}
     for name, one in (("refit", outcome.before), ("chosen", outcome.after)):
         if one is not None:
-            out |= {f"equations_{name}": one.left, f"mendable_{name}": one.mendable}
+            out |= {f"equations_{name}": one.residual, f"mendable_{name}": one.mendable}
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
     out |= {f"closes:{effect.family}": effect.closes for effect in outcome.closable.effects}
     out |= {f"at_bounds:{effect.family}": effect.at_bounds for effect in outcome.closable.effects}
@@ -295,8 +295,8 @@ def _next_experiment(
     return design(outcome.problem, outcome.best, min(rivals, key=lambda s: s.level).fit)
 
 
-def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:
-    notes = [f"{label}: the fit diverged, the candidate lost" for label in contest.lost]
+def _notes(search: Search, best: Fit, problem: Problem) -> list[str]:
+    notes = [f"{label}: the fit diverged, the candidate lost" for label in search.lost]
     low, high = problem.bounds(best.candidate)
     for m, p in enumerate(problem.model.parameters):
         if best.x[m] in (low[m], high[m]):
@@ -304,10 +304,10 @@ def _notes(contest: Contest, best: Fit, problem: Problem) -> list[str]:
     return notes
 
 
-def _hidden(problem: Problem, contest: Contest) -> dict[str, str]:
+def _hidden(problem: Problem, search: Search) -> dict[str, str]:
     """Effects that this excitation could not have shown, with how little their typical size would have moved."""
     out = {}
-    for name, moved in contest.visible.items():
+    for name, moved in search.visible.items():
         if moved < SEEN:
             sizes = [f"{p.name} {p.typical:.3g} {p.unit}" for p in problem.model.effects[name].parameters if p.size]
             out[name] = f"{' or '.join(sizes)} would have moved the outputs by {moved:.2g} sigma only"

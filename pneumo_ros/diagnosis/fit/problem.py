@@ -25,7 +25,7 @@ MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind i
 COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
 REACH = 3.0  # prior sigmas that a nuisance parameter may move
 INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
-SELECT_EVERY = 3  # of so many blocks in turn, one is kept from the fit and used for selection
+SELECT_EVERY = 3  # one of so many blocks is kept from the fit and used for selection
 
 Part = tuple[str, str]  # effect id, site
 Item = TypeVar("Item")
@@ -63,14 +63,14 @@ class Problem:
     model : a :class:`~pneumo_ros.diagnosis.model.Model`
     records : logs to fit
     own_average : log samples in one fit sample; None: what the logs' own pace says
-    turn : which of every :data:`SELECT_EVERY` blocks is kept from the fit
+    fold : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
     """
 
     model: Model
     records: tuple[Any, ...]
     own_average: int | None = None
-    turn: int = SELECT_EVERY - 1
+    fold: int = SELECT_EVERY - 1
     threads: int = 1
     _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
@@ -170,7 +170,7 @@ class Problem:
     @cached_property
     def fitted(self) -> Mask:
         """(n,) samples that the fit sees; the others are for selection."""
-        return self.block % SELECT_EVERY != self.turn
+        return self.block % SELECT_EVERY != self.fold
 
     def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
         """Parameters of all its effects, in order."""

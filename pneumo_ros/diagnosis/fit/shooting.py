@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Multiple shooting: a start for the fit where the free run goes astray.
+"""Multiple shooting: a start for the fit where the free run fails.
 
 A free run that diverges, or ends up further from the log than the log's own mean, tells a fit nothing about where to
 go. Short windows, each with an initial state of its own, stay near the data whatever the parameters (Bock 1983). What
@@ -18,7 +18,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Record
 
 WINDOWS = 2  # in a time block
-ASTRAY = 1.0  # normalised gap of a free run that is worse than the log's own mean
+FAILED_GAP = 1.0  # normalised gap of a free run that is worse than the log's own mean
 
 
 @runtime_checkable
@@ -29,14 +29,14 @@ class Sliceable(Record, Protocol):
         """Rows ``first`` to ``last`` (excluded) with an initial state estimated anew."""
 
 
-def astray(problem: Problem, state: Fit) -> bool:
-    """Whether a fit's free run is no use."""
-    return state.diverged or problem.gap(state.residual.clip(-1e6, 1e6)) > ASTRAY
+def free_run_failed(problem: Problem, state: Fit) -> bool:
+    """Whether a fit's free run diverged or is further from the log than the log's own mean."""
+    return state.diverged or problem.gap(state.residual.clip(-1e6, 1e6)) > FAILED_GAP
 
 
 def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, iterations: int) -> Fit | None:
     """A free-run fit that starts from what windows of the fitted blocks say; None if they cannot be cut or diverge."""
-    pieces = [piece for record in problem.records for piece in _windows(record, problem.turn, problem.pace.block)]
+    pieces = [piece for record in problem.records for piece in _windows(record, problem.fold, problem.pace.block)]
     if not pieces:
         return None
     short = Problem(problem.model, tuple(pieces), problem.averaged)
@@ -50,12 +50,12 @@ def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, itera
     return fit(problem, candidate, begin, iterations=iterations)
 
 
-def _windows(record: Any, turn: int, block: float) -> list[Any]:
+def _windows(record: Any, fold: int, block: float) -> list[Any]:
     """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
     if not isinstance(record, Sliceable):
         return []
     rows = len(record.measured)
     count = max(1, round(rows * record.period / block))
     edges = np.linspace(0, rows, WINDOWS * count + 1).astype(int)
-    seen = [k for k in range(WINDOWS * count) if (k // WINDOWS) % SELECT_EVERY != turn]
+    seen = [k for k in range(WINDOWS * count) if (k // WINDOWS) % SELECT_EVERY != fold]
     return [record.slice(int(edges[k]), int(edges[k + 1])) for k in seen]

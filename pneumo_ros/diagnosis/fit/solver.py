@@ -7,8 +7,8 @@ weight of thousands of samples, and one that fits to the noise is held by the da
 down-weighted (Huber) at a threshold that follows the misfit.
 
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
-between candidates and are taken over from the refit for the first step. A step that keeps its promise carries them on
-by a secant; after one that does not they are taken anew.
+between candidates and are taken over from the refit for the first step. A step that gains about what they predicted
+carries them on by a secant; after one that does not they are taken anew.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STEP = 2e-3  # forward difference in scaled units: short, so that what nothing c
 CENTRAL = 2e-3  # half width of the central differences
 TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
 NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
-KEPT = 0.3  # share of the promised gain from which sensitivities are carried on by a secant rather than taken anew
+KEPT = 0.3  # share of the predicted gain from which sensitivities are carried on by a secant rather than taken anew
 COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
 START_DAMPING, MOST_DAMPING = 1e-4, 1e6
 
@@ -115,12 +115,12 @@ def fit(
             columns = _jacobian(problem, state, borrowed)
             state = replace(state, simulations=state.simulations + _spent(columns, borrowed))
         state = replace(state, jacobian=columns)
-        better, damping, promised = _step(problem, state, rows, bounds, damping)
+        better, damping, predicted = _step(problem, state, rows, bounds, damping)
         gained, moved = state.cost - better.cost, better.x - state.x
-        kept_promise = gained >= TOLERANCE and gained > KEPT * promised
+        as_predicted = gained >= TOLERANCE and gained > KEPT * predicted
         columns = secant(columns, moved, better.residual - state.residual) if gained >= TOLERANCE else columns
         state = replace(better, jacobian=columns)
-        if kept_promise:
+        if as_predicted:
             continue
         if gained < TOLERANCE:
             if (anew and borrowed is None) or failed or probe:
@@ -206,7 +206,7 @@ def _step(
     problem: Problem, state: Fit, rows: Mask, bounds: tuple[Array, Array], damping: float
 ) -> tuple[Fit, float, float]:
     """The first of a few ever more damped steps that gains, the next damping, and the gain that the sensitivities
-    promised.
+    predict.
     """
     low, high = bounds
     H, g = normal_equations(problem, state, rows)

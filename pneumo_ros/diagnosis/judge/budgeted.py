@@ -94,4 +94,4 @@ def _place_of_rest(outcome: Outcome) -> Closing | None:
     if not beside.remainders:
         return None
     best = beside.remainders[0]
-    return best if best.left < (1.0 - WORTH) * beside.own else None
+    return best if best.gap < (1.0 - WORTH) * beside.own else None

@@ -84,13 +84,13 @@ class Remainder:
     places : of the contract
     parts : what was added there
     fit : the structure with it, on all blocks
-    left : held-out gap left, mean square above floor and form
+    gap : held-out gap left, mean square above floor and form
     """
 
     places: tuple[str, ...]
     parts: tuple[Part, ...]
     fit: Fit
-    left: float
+    gap: float
 
 
 @dataclass(frozen=True)
@@ -126,12 +126,12 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         where = problem.model.places(Active(*law, ()))
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         without = above(problem, bare, holdout, floor)
-        walls = at_bounds(problem, best, of_law(best.candidate, law))
-        evidence.append(EffectEvidence(law, where, without, own, added(where).left, at_bounds=walls, floor=stated))
+        bounded = at_bounds(problem, best, of_law(best.candidate, law))
+        evidence.append(EffectEvidence(law, where, without, own, added(where).gap, at_bounds=bounded, floor=stated))
     if places:  # together, what is left may need them all; alone, one of them may do
         added(tuple(places[:TOGETHER]))
         added((places[0],))
-    found = sorted((r for r in remainders.values() if r.left < own), key=lambda r: r.left)
+    found = sorted((r for r in remainders.values() if r.gap < own), key=lambda r: r.gap)
     return Closable(tuple(evidence), tuple(found), own)
 
 

@@ -46,7 +46,7 @@ def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active],
             moved[m] += 0.1 * std[m]
             J[:, m] = (residual(moved) - r) / 0.1
         J[~np.isfinite(J)] = 0.0
-        # A model that is wrong bends the first moments too: its misfit must not be blamed on the initial state.
+        # A wrong model misses the first moments as well: its misfit must not be blamed on the initial state.
         strength = 1.0 / max(1.0, float(np.mean(r * r)))
         prior = (state - centre) / std
         move = bounded_newton(

@@ -13,7 +13,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
-from pneumo_ros.diagnosis.search.competition import Contest
+from pneumo_ros.diagnosis.search.competition import Search
 from pneumo_ros.diagnosis.search.selection import Scored
 from pneumo_ros.effects.parameters import Active
 
@@ -25,14 +25,14 @@ class Whereabouts:
     Attributes
     ----------
     shares : (place, share of the held-out residual that the structure leaves), largest first
-    left : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
+    residual : rms residual of the equations, in null standard deviations, that the structure leaves on the held-out log
     mendable : the same once the right places get a flexible correction
     flat : noise, tolerances and model form explain what is left
     kept : share of the equations' gap that this structure leaves; None for the nominal one, which leaves all of it
     """
 
     shares: tuple[tuple[str, float], ...]
-    left: float
+    residual: float
     mendable: float
     flat: bool
     kept: float | None = None
@@ -44,7 +44,7 @@ class Outcome:
 
     Attributes
     ----------
-    contest : the competition, ended
+    search : the competition, ended
     refit, finalists, chosen : scored on the selection blocks
     base, best : the refit and the chosen structure, fitted to all blocks; the same object where nothing was chosen
     holdout : the held-out record
@@ -54,7 +54,7 @@ class Outcome:
     before, after : places of what the nominal and the best structure leave; None where nobody looked
     """
 
-    contest: Contest
+    search: Search
     refit: Scored
     finalists: tuple[Scored, ...]
     chosen: Scored
@@ -70,7 +70,7 @@ class Outcome:
     @property
     def problem(self) -> Problem:
         """The fitted logs, as last timed."""
-        return self.contest.problem
+        return self.search.problem
 
     @property
     def nuisance(self) -> Array:

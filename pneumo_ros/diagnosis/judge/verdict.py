@@ -31,7 +31,7 @@ class Calibration:
     ----------
     sharpness : fall of log probability per unit of log mean square of the fitted data: as many samples' worth of
         evidence, however long the log, because laws differ by more than chance does
-    first_toll, second_toll : of log probability, for a first and a second effect: what chance wins
+    first_penalty, second_penalty : of log probability, for a first and a second effect: what chance wins
     closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
         "something else acts there"
     leaves : what its family may leave, in what whatever may act there leaves, to be as likely
@@ -39,18 +39,18 @@ class Calibration:
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
-    walls : parameters of an effect at their bounds at which "unknown" is as likely as the name
+    at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
     sharpness: float = 36.0
-    first_toll: float = 9.0
-    second_toll: float = 9.0
+    first_penalty: float = 9.0
+    second_penalty: float = 9.0
     closes: float = 0.5
     leaves: float = 2.0
     steepness: float = 4.0
     real: float = 2.5
-    walls: float = 0.9
+    at_bounds: float = 0.9
     least: float = 0.002
     slight: float = 0.12
     held_real: float = 3.0
@@ -159,7 +159,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
-               one.at_bounds / c.walls, c.least / max(one.share, 1e-9),
+               one.at_bounds / c.at_bounds, c.least / max(one.share, 1e-9),
                c.slight / max(closed, 1e-9)]  # fmt: skip
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
@@ -176,15 +176,15 @@ def structures(
     """Softmax of the training costs, parameters and effects paying their price; the selection has the last word."""
     c = calibration
 
-    def height(s: Scored) -> float:
-        tolls = c.first_toll * min(s.size, 1) + c.second_toll * max(s.size - 1, 0)
-        return -c.sharpness * s.price / s.samples - tolls
+    def log_weight(s: Scored) -> float:
+        penalty = c.first_penalty * min(s.size, 1) + c.second_penalty * max(s.size - 1, 0)
+        return -c.sharpness * s.price / s.samples - penalty
 
-    heights = {s.fit.candidate: height(s) for s in (refit, *finalists)}
-    top = max(heights.values())
+    log_weights = {s.fit.candidate: log_weight(s) for s in (refit, *finalists)}
+    top = max(log_weights.values())
     # What the selection blocks chose is at least as probable as any other.
-    heights[chosen.fit.candidate] = max(top, heights[chosen.fit.candidate])
-    weights = {c: float(np.exp(h - top)) for c, h in heights.items()}
+    log_weights[chosen.fit.candidate] = max(top, log_weights[chosen.fit.candidate])
+    weights = {c: float(np.exp(w - top)) for c, w in log_weights.items()}
     total = sum(weights.values())
     return {c: w / total for c, w in weights.items()}
 

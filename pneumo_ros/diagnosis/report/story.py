@@ -292,8 +292,9 @@ def why_not(summary: Mapping[str, Any]) -> str:
         if share is not None and float(share) < limits.closes:
             reasons.append(f"whatever may act at its place closes more: {effect_name(effect)} closes "
                            f"{percent(float(share))} of that, and half is needed")  # fmt: skip
-    if float(evidence.get("walls") or 0.0) >= limits.walls:
-        reasons.append(f"{float(evidence['walls']):.0f} of its parameters stop at the ends of their ranges")
+        bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
+        if bounded >= limits.at_bounds:
+            reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
     if float(entry["shrink"]) <= 0.0:
         reasons.append("it does not shrink the held-out gap")
     if float(evidence.get("effects") or 0.0) == 0.0:
@@ -345,4 +346,4 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
         return (
             f"{name} was fitted and is number {number} of {len(order)}: {float(tried[0]['gap_fit'] or np.inf):.3g} left"
         )
-    return f"{name} promised too little in the first trial to be fitted"
+    return f"{name} scored too low in the screening to be fitted"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The competition: nominal re-estimated, single effects, pairs; each fitted with every nuisance parameter free.
 
-Cheap screening first (:mod:`pneumo_ros.diagnosis.search.screening`), short fits of what promises most, then the best to
+Cheap screening first (:mod:`pneumo_ros.diagnosis.search.screening`), short fits of what scores best, then the best to
 convergence, from several starts. The second effect of a pair is looked for twice: among all pairs at the refit, and on
 top of each leading single, where the first effect no longer hides it. Whenever the best fit so far is good enough to
 time the command's jumps by (:mod:`pneumo_ros.diagnosis.fit.command_events`), they are timed and the finalists fitted
@@ -18,14 +18,21 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
+from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
-from pneumo_ros.diagnosis.search.screening import Promise, all_parts, compatible, promises, trials, visibility
-from pneumo_ros.diagnosis.search.selection import FORM, TOLL, Thresholds, noise_level, score, used_unknowns
+from pneumo_ros.diagnosis.search.screening import (
+    CandidateScore,
+    all_parts,
+    candidate_scores,
+    compatible,
+    trials,
+    visibility,
+)
+from pneumo_ros.diagnosis.search.selection import FORM, PARAMETER_PENALTY, Thresholds, noise_level, score, used_unknowns
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.errors import InputError
 
-PROBE = 5  # steps of a probe
+PROBE = 5  # iterations of the fit of a probed candidate
 LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
 NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
 STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
@@ -61,7 +68,7 @@ class Effort:
 
 
 @dataclass
-class Contest:
+class Search:
     """The state of a competition; ends as its result.
 
     Attributes
@@ -71,7 +78,7 @@ class Contest:
     refit : the nominal structure re-estimated
     singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
     structures : leading ones with the shapes of their families, and those that grew from them
-    promised : screening of the singles at the refit, for the report
+    screened : screening of the singles at the refit, for the report
     lost : labels of candidates whose fit diverged
     visible : effect id -> rms in sigmas that its typical size would move the outputs by
     """
@@ -84,7 +91,7 @@ class Contest:
     singles: list[Fit] = field(default_factory=list)
     pairs: list[Fit] = field(default_factory=list)
     structures: list[Fit] = field(default_factory=list)
-    promised: list[Promise] = field(default_factory=list)
+    screened: list[CandidateScore] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
     visible: dict[str, float] = field(default_factory=dict)
 
@@ -110,11 +117,11 @@ class Contest:
 
 
 def _price(one: Fit) -> float:
-    """Training cost with the toll of what was fitted, and a little for each shape: a law that does as well wins."""
-    return one.cost + TOLL * used_unknowns(one) + len(one.candidate.shapes)
+    """Training cost with the penalty of what was fitted, and a little for each shape: a law that does as well wins."""
+    return one.cost + PARAMETER_PENALTY * used_unknowns(one) + len(one.candidate.shapes)
 
 
-def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Contest:
+def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Search:
     """Run the competition; ``progress`` is called with the share done."""
     progress(0.0, "re-estimating the nominal model")
     nominal = Candidate()
@@ -123,18 +130,18 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
         raise InputError("the nominal model runs away on these logs, whatever its tolerances",
                          where=", ".join(r.name for r in problem.records),
                          remedy="check rig values, units and signs of command and road")  # fmt: skip
-    problem, refit = _in_turn(problem, refit)
-    contest = Contest(problem, problem, refit, effort, progress)
-    _time_jumps(contest)
-    _run_singles(contest)
-    _time_jumps(contest)
-    if pairs and contest.singles and room_for_more(contest):
-        _run_pairs(contest)
-        _time_jumps(contest)
-    return contest
+    problem, refit = _choose_fold(problem, refit)
+    search = Search(problem, problem, refit, effort, progress)
+    _time_jumps(search)
+    _run_singles(search)
+    _time_jumps(search)
+    if pairs and search.singles and room_for_more(search):
+        _run_pairs(search)
+        _time_jumps(search)
+    return search
 
 
-def _in_turn(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
+def _choose_fold(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
     """The problem with those blocks kept from the fit that hold about their share of what the nominal model leaves.
 
     A stop that is hit once, or a wheel that leaves the ground once, may lie in the kept blocks alone, where nothing can
@@ -142,110 +149,110 @@ def _in_turn(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
     """
     squares = np.where(problem.weight > 0.0, refit.residual**2, 0.0).sum(axis=1)
     whole = max(float(squares.sum()), 1e-12)
-    shares = [squares[problem.block % SELECT_EVERY == turn].sum() / whole for turn in range(SELECT_EVERY)]
-    if LOPSIDED[0] <= shares[problem.turn] <= LOPSIDED[1]:
+    shares = [squares[problem.block % SELECT_EVERY == fold].sum() / whole for fold in range(SELECT_EVERY)]
+    if LOPSIDED[0] <= shares[problem.fold] <= LOPSIDED[1]:
         return problem, refit
-    turn = int(np.argmin(np.abs(np.array(shares) - 1.0 / SELECT_EVERY)))
-    if turn == problem.turn:
+    fold = int(np.argmin(np.abs(np.array(shares) - 1.0 / SELECT_EVERY)))
+    if fold == problem.fold:
         return problem, refit
-    problem = replace(problem, turn=turn)
+    problem = replace(problem, fold=fold)
     return problem, fit(problem, refit.candidate, refit.x, refit.jacobian, iterations=15)
 
 
 def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
-    """The fit, or, where its free run went astray, the better one that starts from short windows."""
-    if not astray(problem, state):
+    """The fit, or, where its free run failed, the better one that starts from short windows."""
+    if not free_run_failed(problem, state):
         return state
     other = fit_from_windows(problem, state.candidate, state.x, iterations)
     return state if other is None or not other.cost < state.cost else other
 
 
-def room_for_more(contest: Contest) -> bool:
+def room_for_more(search: Search) -> bool:
     """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
     blocks is so near the sensors' noise that even all of the rest would not be enough.
     """
-    problem = contest.problem
-    least = min(score(problem, one).level for one in (contest.refit, *contest.finalists))
+    problem = search.problem
+    least = min(score(problem, one).level for one in (search.refit, *search.finalists))
     return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
 
 
-def _time_jumps(contest: Contest) -> None:
+def _time_jumps(search: Search) -> None:
     """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
-    moved = timed(contest.logged, contest.problem, contest.best)
-    if moved is contest.problem:
+    moved = timed(search.logged, search.problem, search.best)
+    if moved is search.problem:
         return
-    contest.problem = moved
-    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=contest.effort.long) for f in contest.laws]
-    contest.refit = fit(moved, Candidate(), contest.refit.x, contest.refit.jacobian)
-    singles, pairs = contest.effort.finalists, contest.effort.pair_finalists
-    done = len(contest.singles[:singles])
-    contest.singles = _by_cost(again[:done]) + contest.singles[singles:]
-    contest.pairs = _by_cost(again[done:]) + contest.pairs[pairs:]
+    search.problem = moved
+    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=search.effort.long) for f in search.laws]
+    search.refit = fit(moved, Candidate(), search.refit.x, search.refit.jacobian)
+    singles, pairs = search.effort.finalists, search.effort.pair_finalists
+    done = len(search.singles[:singles])
+    search.singles = _by_cost(again[:done]) + search.singles[singles:]
+    search.pairs = _by_cost(again[done:]) + search.pairs[pairs:]
 
 
-def _run_singles(contest: Contest) -> None:
-    effort, problem = contest.effort, contest.problem
-    contest.progress(0.05, "screening effects")
-    contest.refit = refreshed(problem, contest.refit)
-    found = trials(problem, contest.refit, all_parts(problem))
-    contest.promised = promises(problem, contest.refit, found)
-    contest.visible = visibility(problem, contest.refit, found)
-    chosen = varied(probed(problem, contest.refit, contest.promised), effort.singles, 3)
-    short = short_fits(contest, contest.refit, chosen, (0.1, 0.4))
+def _run_singles(search: Search) -> None:
+    effort, problem = search.effort, search.problem
+    search.progress(0.05, "screening effects")
+    search.refit = refreshed(problem, search.refit)
+    found = trials(problem, search.refit, all_parts(problem))
+    search.screened = candidate_scores(problem, search.refit, found)
+    search.visible = visibility(problem, search.refit, found)
+    chosen = varied(probed(problem, search.refit, search.screened), effort.singles, 3)
+    short = short_fits(search, search.refit, chosen, (0.1, 0.4))
     ended = [
-        _finish(problem, one, effort, contest.refit if k < STARTED_TWICE else None)
+        _finish(problem, one, effort, search.refit if k < STARTED_TWICE else None)
         for k, one in enumerate(short[: effort.finalists])
     ]
-    contest.singles = _by_cost(ended) + short[effort.finalists :]
+    search.singles = _by_cost(ended) + short[effort.finalists :]
 
 
-def _run_pairs(contest: Contest) -> None:
-    effort, problem = contest.effort, contest.problem
-    contest.progress(0.6, "screening pairs")
+def _run_pairs(search: Search) -> None:
+    effort, problem = search.effort, search.problem
+    search.progress(0.6, "screening pairs")
     seen: set[frozenset[Part]] = set()
 
-    def unseen(promised: Sequence[Promise], base: tuple[Part, ...], count: int) -> list[Promise]:
-        fresh = varied([p for p in promised if frozenset((*base, *p.parts)) not in seen], count, 2)
+    def unseen(screened: Sequence[CandidateScore], base: tuple[Part, ...], count: int) -> list[CandidateScore]:
+        fresh = varied([p for p in screened if frozenset((*base, *p.parts)) not in seen], count, 2)
         seen.update(frozenset((*base, *p.parts)) for p in fresh)
         return fresh
 
     short: list[Fit] = []
-    for k, (single, count) in enumerate(zip(contest.singles, effort.seconds, strict=False)):
+    for k, (single, count) in enumerate(zip(search.singles, effort.seconds, strict=False)):
         leader = refreshed(problem, single)
         part = leader.candidate.parts[0]
         others = [p for p in all_parts(problem) if compatible(problem.model, part, p)]
-        promised = promises(problem, leader, trials(problem, leader, others))
-        promised = probed(problem, leader, varied(promised, effort.probes, 3))
+        screened = candidate_scores(problem, leader, trials(problem, leader, others))
+        screened = probed(problem, leader, varied(screened, effort.probes, 3))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
-        short += short_fits(contest, leader, unseen(promised, (part,), count), span)
-    found = trials(problem, contest.refit, all_parts(problem))
-    blind = unseen(promises(problem, contest.refit, found, pairs=True), (), effort.blind_pairs)
-    short = _by_cost(short + short_fits(contest, contest.refit, blind, (0.8, 0.85)))
+        short += short_fits(search, leader, unseen(screened, (part,), count), span)
+    found = trials(problem, search.refit, all_parts(problem))
+    blind = unseen(candidate_scores(problem, search.refit, found, pairs=True), (), effort.blind_pairs)
+    short = _by_cost(short + short_fits(search, search.refit, blind, (0.8, 0.85)))
     ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
-    contest.pairs = _by_cost(ended) + short[effort.pair_finalists :]
-    _exchange_each(contest)
-    _try_without_each(contest)
+    search.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+    _exchange_each(search)
+    _try_without_each(search)
 
 
-def _exchange_each(contest: Contest) -> None:
+def _exchange_each(search: Search) -> None:
     """For each effect of the best pair, the likeliest other one of the same place: a lag has a delay as its rival, and
     neither may win because the other was never tried beside the same second effect.
     """
-    problem, effort = contest.problem, contest.effort
-    if not contest.pairs:
+    problem, effort = search.problem, search.effort
+    if not search.pairs:
         return
-    pair = contest.pairs[0]
+    pair = search.pairs[0]
     for k, part in enumerate(pair.candidate.parts):
         kept = pair.candidate.parts[1 - k]
         alone = refreshed(problem, fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1))
         if alone.diverged:  # without the other effect
             continue
         rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible(problem.model, kept, p)]
-        tried = {frozenset(f.candidate.parts) for f in contest.pairs[: effort.pair_finalists]}
-        promised = promises(problem, alone, trials(problem, alone, rivals))
-        fresh = [p for p in promised if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
-        for short in short_fits(contest, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
-            contest.pairs = _by_cost([*contest.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
+        tried = {frozenset(f.candidate.parts) for f in search.pairs[: effort.pair_finalists]}
+        screened = candidate_scores(problem, alone, trials(problem, alone, rivals))
+        fresh = [p for p in screened if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
+        for short in short_fits(search, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
+            search.pairs = _by_cost([*search.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
 
 
 def _rivals(problem: Problem, part: Part, other: Part) -> bool:
@@ -272,61 +279,64 @@ def _alone(problem: Problem, pair: Fit, part: Part) -> tuple[Candidate, Array]:
     raise AssertionError(f"{part} is no part of {pair.candidate.label}")
 
 
-def _try_without_each(contest: Contest) -> None:
+def _try_without_each(search: Search) -> None:
     """Each effect of the best pair alone, from the pair's values: a start that no screening of singles has seen."""
-    problem, pair = contest.problem, contest.pairs[0] if contest.pairs else None
+    problem, pair = search.problem, search.pairs[0] if search.pairs else None
     if pair is None:
         return
     for part in pair.candidate.parts:
         candidate, start = _alone(problem, pair, part)
-        start[: problem.fixed] = contest.refit.x[: problem.fixed]
-        alone = fit(problem, candidate, start, contest.refit.jacobian, iterations=contest.effort.long)
-        before = min((f.cost for f in contest.finalists if f.candidate == candidate), default=np.inf)
+        start[: problem.fixed] = search.refit.x[: problem.fixed]
+        alone = fit(problem, candidate, start, search.refit.jacobian, iterations=search.effort.long)
+        before = min((f.cost for f in search.finalists if f.candidate == candidate), default=np.inf)
         if alone.cost < before - 1.0:
-            rest = [f for f in contest.singles if f.candidate != candidate]
-            contest.singles = _by_cost([alone, *rest[: contest.effort.finalists]]) + rest[contest.effort.finalists :]
+            rest = [f for f in search.singles if f.candidate != candidate]
+            search.singles = _by_cost([alone, *rest[: search.effort.finalists]]) + rest[search.effort.finalists :]
 
 
-def varied(promised: Sequence[Promise], count: int, sites: int) -> list[Promise]:
-    """The most promising, but not more than a few sites of one effect, so that rivals of another kind get their
+def varied(screened: Sequence[CandidateScore], count: int, sites: int) -> list[CandidateScore]:
+    """Those with the best scores, but not more than a few sites of one effect, so that rivals of another kind get their
     chance.
     """
-    taken: list[Promise] = []
-    for promise in promised:
-        kind = [effect for effect, _ in promise.parts]
+    taken: list[CandidateScore] = []
+    for one in screened:
+        kind = [effect for effect, _ in one.parts]
         if sum([effect for effect, _ in p.parts] == kind for p in taken) < sites:
-            taken.append(promise)
+            taken.append(one)
         if len(taken) == count:
             break
     return taken
 
 
-def probed(problem: Problem, base: Fit, promised: Sequence[Promise]) -> list[Promise]:
-    """The promises in the order of what a few cheap steps make of them, with the values those end at: the screening is
-    linear, and a typical size may be far from the true one.
+def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> list[CandidateScore]:
+    """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
+    those end at: the screening is linear, and a typical size may be far from the true one.
     """
     own = problem.values(base.candidate, base.x)
     ranked = []
-    for promise in promised:
-        candidate = Candidate((*base.candidate.parts, *promise.parts))
-        start = problem.start(candidate, base.x[: problem.fixed], [*own, *promise.values])
+    for entry in screened:
+        candidate = Candidate((*base.candidate.parts, *entry.parts))
+        start = problem.start(candidate, base.x[: problem.fixed], [*own, *entry.values])
         one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
         values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
-        ranked.append((one.cost, promise if one.diverged else replace(promise, values=values)))
-    return [promise for _, promise in sorted(ranked, key=lambda item: item[0])]
+        ranked.append((one.cost, entry if one.diverged else replace(entry, values=values)))
+    return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
 
 
-def short_fits(contest: Contest, base: Fit, chosen: Sequence[Promise], span: tuple[float, float]) -> list[Fit]:
-    problem, out = contest.problem, []
-    for k, promise in enumerate(chosen):
-        candidate = Candidate((*base.candidate.parts, *promise.parts))
-        contest.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
-        values = [*problem.values(base.candidate, base.x), *promise.values]
+def short_fits(search: Search, base: Fit, chosen: Sequence[CandidateScore], span: tuple[float, float]) -> list[Fit]:
+    """Each chosen candidate on top of the base, fitted for ``effort.short`` iterations, lowest training cost first;
+    those that diverge are noted in ``search.lost``. ``span`` : share of the whole search done before and after.
+    """
+    problem, out = search.problem, []
+    for k, entry in enumerate(chosen):
+        candidate = Candidate((*base.candidate.parts, *entry.parts))
+        search.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
+        values = [*problem.values(base.candidate, base.x), *entry.values]
         start = problem.start(candidate, base.x[: problem.fixed], values)
-        one = fit(problem, candidate, start, base.jacobian, iterations=contest.effort.short, shared=len(base.x))
-        one = _rescued(problem, one, contest.effort.short)
+        one = fit(problem, candidate, start, base.jacobian, iterations=search.effort.short, shared=len(base.x))
+        one = _rescued(problem, one, search.effort.short)
         if one.diverged:
-            contest.lost.append(candidate.label)
+            search.lost.append(candidate.label)
         else:
             out.append(one)
     return _by_cost(out)

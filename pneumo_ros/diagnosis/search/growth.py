@@ -16,8 +16,8 @@ from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.search.competition import Contest, probed, room_for_more, short_fits, varied
-from pneumo_ros.diagnosis.search.screening import all_parts, compatible, promises, trials
+from pneumo_ros.diagnosis.search.competition import Search, probed, room_for_more, short_fits, varied
+from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
@@ -26,60 +26,61 @@ SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
 SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
 COUNTS = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end
 EXCHANGED = (8, 1, 1)  # the same for each effect that is exchanged
-TURNS = 9  # additions and exchanges at most
-STRANGE, LEFT = 4.0, 0.01  # mean square on the kept blocks, in sigmas and of the refit's: above both something is wrong
-STEP = 0.3  # of the gain that would be evident: what a turn must bring, as a step towards one that is
+ROUNDS = 9  # additions and exchanges at most
+# Mean square on the kept blocks above which a structure is wrong: sigma squared, and as a share of the refit's.
+MISFIT, MISFIT_OF_REFIT = 4.0, 0.01
+STEP = 0.3  # of the gain that would be evident: what a round must bring, as a step towards one that is
 EXCHANGES, MISSED_LEAST = 3, 3  # times that no addition helps; effects that are then tried for exchange
 STEPS = 5
 IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
 
 
-def grow(contest: Contest, limits: Thresholds, further: bool = True) -> None:
-    """Fill ``contest.structures``: leading singles and pairs with their shapes, and what grows from the best."""
-    contest.progress(0.82, "shapes")
-    for found, count in zip((contest.singles, contest.pairs), SHAPED, strict=True):
-        contest.structures += [with_shapes(contest.problem, one) for one in found[:count]]
-    best = _selected(contest, limits)
-    if further and best.size and room_for_more(contest):
-        _climb(contest, best, max(limits.second_cost, limits.second_share * best.samples))
-        best = _selected(contest, limits)
+def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
+    """Fill ``search.structures``: leading singles and pairs with their shapes, and what grows from the best."""
+    search.progress(0.82, "shapes")
+    for found, count in zip((search.singles, search.pairs), SHAPED, strict=True):
+        search.structures += [with_shapes(search.problem, one) for one in found[:count]]
+    best = _selected(search, limits)
+    if further and best.size and room_for_more(search):
+        _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
+        best = _selected(search, limits)
     if best.size > 1:
-        _refine(contest, best, limits)
-    best = _selected(contest, limits)
+        _refine(search, best, limits)
+    best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
-        contest.structures.append(_without_idle_shapes(contest, best.fit))
+        search.structures.append(_without_idle_shapes(search, best.fit))
 
 
-def _climb(contest: Contest, start: Scored, evident: float) -> None:
+def _climb(search: Search, start: Scored, evident: float) -> None:
     """Structures of ever more effects, by floating search (Pudil, Novovicova, Kittler 1994, Pattern Recognition Letters
     15, 1119-1125): after each addition, an effect that the others have made needless goes, and what has room then may
     come; where no addition helps, one is exchanged. ``evident`` is the gain that a further effect must bring at last.
     """
-    problem, worth, exchanges = contest.problem, STEP * evident, EXCHANGES
+    problem, worth, exchanges = search.problem, STEP * evident, EXCHANGES
 
     def price(one: Fit) -> float:
         return score(problem, one).price
 
-    strange = max(STRANGE, LEFT * score(problem, contest.refit).level)
+    misfit = max(MISFIT, MISFIT_OF_REFIT * score(problem, search.refit).level)
     current, known = start.fit, {start.size: start.price}
-    for turn in range(TURNS):
-        contest.progress(0.84 + 0.05 * turn / TURNS, f"beside {current.candidate.label}")
+    for number in range(ROUNDS):
+        search.progress(0.84 + 0.05 * number / ROUNDS, f"beside {current.candidate.label}")
         size = len(current.candidate.laws)
-        found = _one_more(contest, current) if size < MOST else []
+        found = _one_more(search, current) if size < MOST else []
         if not found or min(map(price, found)) > price(current) - worth:
-            wrong = exchanges > 0 and score(problem, current).level > strange
-            found, exchanges = _one_exchanged(contest, current, worth) if wrong else [], exchanges - 1
+            wrong = exchanges > 0 and score(problem, current).level > misfit
+            found, exchanges = _one_exchanged(search, current, worth) if wrong else [], exchanges - 1
         if not found:
             break
-        contest.structures += found
+        search.structures += found
         current = min(found, key=price)
         size = len(current.candidate.laws)
         known[size] = min(price(current), known.get(size, np.inf))
         less = _one_less(problem, current) if size > 2 else None
         if less is not None and price(less) < known.get(size - 1, np.inf) - worth:
-            contest.structures.append(less)
+            search.structures.append(less)
             current, known[size - 1] = less, price(less)
-        if not room_for_more(contest):
+        if not room_for_more(search):
             break
 
 
@@ -90,13 +91,13 @@ def _one_less(problem: Problem, found: Fit) -> Fit | None:
     return None if best.diverged else reduced(problem, best, (), STEPS)
 
 
-def _one_exchanged(contest: Contest, found: Fit, worth: float) -> list[Fit]:
+def _one_exchanged(search: Search, found: Fit, worth: float) -> list[Fit]:
     """The structure with one of its effects exchanged for what helps more, those it misses least first."""
-    problem = contest.problem
+    problem = search.problem
     without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws]
     usable = sorted((one for one in without if not one.diverged and one.candidate.laws), key=lambda one: one.cost)
     for bare in usable[:MISSED_LEAST]:
-        other = _one_more(contest, bare, EXCHANGED)
+        other = _one_more(search, bare, EXCHANGED)
         if other and score(problem, other[0]).price < score(problem, found).price - worth:
             return other
     return []
@@ -159,33 +160,33 @@ def restricted(problem: Problem, one: Fit, candidate: Candidate) -> np.ndarray:
     return np.concatenate([one.x[: problem.fixed], *(own[part] for part in candidate.parts)])
 
 
-def _selected(contest: Contest, limits: Thresholds) -> Scored:
-    problem = contest.problem
-    return select(score(problem, contest.refit), [score(problem, f) for f in contest.finalists], limits)
+def _selected(search: Search, limits: Thresholds) -> Scored:
+    problem = search.problem
+    return select(score(problem, search.refit), [score(problem, f) for f in search.finalists], limits)
 
 
-def _one_more(contest: Contest, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
+def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
     """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end."""
-    problem, effort = contest.problem, contest.effort
+    problem, effort = search.problem, search.effort
     laws = base.candidate.laws
     others = [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
     leader = refreshed(problem, base)
-    promised = varied(promises(problem, leader, trials(problem, leader, others)), counts[0], 2)
-    chosen = probed(problem, leader, promised)[: counts[1]]
-    short = short_fits(contest, leader, chosen, (0.86, 0.86))
+    screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
+    chosen = probed(problem, leader, screened)[: counts[1]]
+    short = short_fits(search, leader, chosen, (0.86, 0.86))
     ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long) for one in short[: counts[2]]]
     return [with_shapes(problem, one, effort.short) for one in ended]
 
 
-def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
+def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
     """Each effect of the best structure against its rivals of the same place, and against its absence."""
-    problem, found = contest.problem, best.fit
+    problem, found = search.problem, best.fit
     for law in found.candidate.laws:
         own = of_law(found.candidate, law)
         bare = reduced(problem, found, own, iterations=2)
         if bare.diverged:
             continue
-        found = _exchanged(contest, found, bare, law)
+        found = _exchanged(search, found, bare, law)
     for law in found.candidate.laws:
         if len(found.candidate.laws) < 2:
             break
@@ -194,7 +195,7 @@ def _refine(contest: Contest, best: Scored, limits: Thresholds) -> None:
         if advantage(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
             found = without
     if found is not best.fit:
-        contest.structures.append(found)
+        search.structures.append(found)
 
 
 def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
@@ -202,18 +203,18 @@ def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
     return tuple(p for p in candidate.parts if p[1] == law[1] and family_of(p[0]) == family_of(law[0]))
 
 
-def _exchanged(contest: Contest, found: Fit, bare: Fit, law: Part) -> Fit:
+def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
-    problem, effort = contest.problem, contest.effort
+    problem, effort = search.problem, search.effort
     bare = refreshed(problem, bare)
     others = bare.candidate.laws
     able = (p for p in all_parts(problem) if all(compatible(problem.model, other, p) for other in others))
     rivals = [part for part in able if _rival(problem, law, part)]
-    promised = promises(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
-    for short in short_fits(contest, bare, probed(problem, bare, promised)[:1], (0.9, 0.9)):
+    screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
+    for short in short_fits(search, bare, probed(problem, bare, screened)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)
         if score(problem, other).price < score(problem, found).price:
-            contest.structures.append(other)
+            search.structures.append(other)
             return other
     return found
 
@@ -226,10 +227,10 @@ def _rival(problem: Problem, law: Part, other: Part) -> bool:
     return one[:1] == two[:1]
 
 
-def _without_idle_shapes(contest: Contest, found: Fit) -> Fit:
+def _without_idle_shapes(search: Search, found: Fit) -> Fit:
     """The structure without those shapes that the kept blocks do not miss: there the law is the rig's."""
-    problem = contest.problem
-    for bare in (one for one in contest.laws if one.candidate.parts == found.candidate.laws):
+    problem = search.problem
+    for bare in (one for one in search.laws if one.candidate.parts == found.candidate.laws):
         if _does(problem, bare, found):
             return bare
     for part in found.candidate.shapes:

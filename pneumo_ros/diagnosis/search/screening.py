@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which candidates are worth a fit: the gain each promises once the nuisance parameters have answered it.
+"""Which candidates are worth a fit: each one's score is the gain it may bring beside refitted nuisance parameters.
 
 A trial prediction with the effect at a start value moves the outputs by some trajectory (not only infinitesimally: a
 deadband or a stop does nothing when small). Projected onto what nuisance parameters and initial state cannot do, and
@@ -27,7 +27,7 @@ SMALL = 0.15  # of the typical size: an effect may be saturated at its typical s
 
 
 @dataclass(frozen=True)
-class Promise:
+class CandidateScore:
     """A candidate extension with the share of the misfit (mean square) that it may explain.
 
     Attributes
@@ -88,15 +88,15 @@ def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
     return [trial for trial in problem.each(tried, starts) if trial is not None]
 
 
-def promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[Promise]:
-    """Singles (or pairs) of the trials, the most promising first, one entry for each part (or pair of parts).
+def candidate_scores(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[CandidateScore]:
+    """Singles (or pairs) of the trials, the best first, one entry for each part (or pair of parts).
 
     Judged twice, and merged in turn: once with the unknowns that stand at a bound held there, once with them free,
     because the right effect is what lets them come back from it.
     """
-    held = _promises(problem, base, found, pairs, held=True)
-    free = _promises(problem, base, found, pairs, held=False)
-    merged: dict[tuple[Part, ...], Promise] = {}
+    held = _candidate_scores(problem, base, found, pairs, held=True)
+    free = _candidate_scores(problem, base, found, pairs, held=False)
+    merged: dict[tuple[Part, ...], CandidateScore] = {}
     for couple in zip_longest(held, free):
         for one in couple:
             if one is not None:
@@ -118,12 +118,14 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     return out
 
 
-def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool) -> list[Promise]:
+def _candidate_scores(
+    problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool
+) -> list[CandidateScore]:
     gram, with_residual, total = _projected(problem, base, found, held)
     signed = np.array([_signed(problem, trial) for trial in found], dtype=bool)
     explained = _explained_by_pairs if pairs else _explained_alone
     share, sizes, members = explained(gram, -with_residual, signed)
-    best: dict[tuple[Part, ...], Promise] = {}
+    best: dict[tuple[Part, ...], CandidateScore] = {}
     for k in np.argsort(-share, kind="stable"):
         if share[k] <= 0.0:
             break
@@ -131,7 +133,7 @@ def _promises(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, 
         if parts in best or (pairs and not compatible(problem.model, *parts)):
             continue
         values = [_scaled(problem, found[m], s) for m, s in zip(members[k], sizes[k], strict=True)]
-        best[parts] = Promise(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
+        best[parts] = CandidateScore(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
     return list(best.values())
 
 

@@ -21,7 +21,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.paths import share_file
 
 FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
-TOLL = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
+PARAMETER_PENALTY = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
 UNUSED = 1e-3  # of a typical amplitude: an atom that stands at nothing
 SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
 
@@ -103,12 +103,12 @@ class Scored:
 
     @property
     def price(self) -> float:
-        """Training cost with the toll of its parameters. An effect at one end that was seen is preferred to the same at
-        both, where the other end's was not: on another road it would act.
+        """Training cost with :data:`PARAMETER_PENALTY` for each parameter used and each effect claimed at both ends: an
+        effect at one end is preferred where the other end's was not seen, because on another road it would act.
         """
         laws = self.fit.candidate.laws
         wide = sum(site == "both" for _, site in laws)
-        return self.fit.cost + TOLL * (used_unknowns(self.fit) + wide)
+        return self.fit.cost + PARAMETER_PENALTY * (used_unknowns(self.fit) + wide)
 
 
 def used_unknowns(fit: Fit) -> int:

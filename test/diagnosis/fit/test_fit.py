@@ -17,7 +17,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit, sensitivit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
 from pneumo_ros.diagnosis.search.competition import starts_elsewhere
-from pneumo_ros.diagnosis.search.screening import all_parts, promises, trials, visibility
+from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, trials, visibility
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim
@@ -63,7 +63,7 @@ def test_screening_ranks_the_true_effect_first(model: RigModel) -> None:
     record = log(model, 1, drawn(model, 4, 0.5), (Active("valve_lag", "rear", (0.02, 0.8)),))
     problem = Problem(model, (record,))
     refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
-    ranked = promises(problem, refit, trials(problem, refit, all_parts(problem)))
+    ranked = candidate_scores(problem, refit, trials(problem, refit, all_parts(problem)))
     assert (("valve_lag", "rear"),) in [p.parts for p in ranked[:2]] and ranked[0].share > 0.8
 
 
@@ -191,7 +191,7 @@ def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
 
 
 @pytest.mark.parametrize(
-    ("effect", "values", "walls"),
+    ("effect", "values", "bounded"),
     [
         ("bump_stop", (2e4, 0.004, 0.0, 0.0), 0),  # a stop without hardening or loss
         ("bump_stop", (2e4, 0.014, 100.0, 2.0), 1.0),
@@ -199,9 +199,9 @@ def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
         ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 1.5),  # its size, and its frequency
     ],
 )
-def test_natural_ends_of_a_law_are_no_walls(
-    model: RigModel, effect: str, values: tuple[float, ...], walls: float
+def test_natural_ends_of_a_law_are_no_bounds(
+    model: RigModel, effect: str, values: tuple[float, ...], bounded: float
 ) -> None:
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(((effect, "front"),))
     x = problem.start(candidate, None, values)
-    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == walls
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == bounded

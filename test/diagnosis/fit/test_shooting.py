@@ -12,7 +12,7 @@ from helpers.driven_log import NOISE, PERIOD, DrivenLog
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
-from pneumo_ros.diagnosis.fit.shooting import astray, fit_from_windows
+from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
 from pneumo_ros.diagnosis.fit.solver import fit
 from pneumo_ros.diagnosis.model import EffectLike
 from pneumo_ros.diagnosis.search.competition import Effort, compete
@@ -68,7 +68,7 @@ def test_windows_find_what_the_free_run_cannot() -> None:
     problem = Problem(Plant(), (record(6.0),))
     start = problem.start(Candidate(), None, ())
     lost = fit(problem, Candidate(), start, iterations=15)
-    assert astray(problem, lost)
+    assert free_run_failed(problem, lost)
     found = fit_from_windows(problem, Candidate(), start, 8)
     assert found is not None and problem.gap(found.residual) < 0.02 < 1.0 < problem.gap(lost.residual)
     assert problem.nuisance(found.x)[0] == pytest.approx(TRUE_GROWTH, abs=0.06)

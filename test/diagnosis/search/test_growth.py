@@ -85,10 +85,10 @@ def made(sizes: Mapping[str, float]) -> Made:
 
 def test_a_signal_that_resembles_four_effects_makes_room_for_them() -> None:
     problem = Problem(Sum(), (made({"a": 1.0, "b": 0.6, "c": 1.2, "d": 0.8}),))
-    contest = compete(problem, Effort(), True, lambda share, what: None)
-    assert contest.singles[0].candidate.laws == (("decoy", ""),)  # or this test would show nothing
-    grow(contest, Thresholds())
-    refit, *others = (score(contest.problem, one) for one in (contest.refit, *contest.finalists))
+    search = compete(problem, Effort(), True, lambda share, what: None)
+    assert search.singles[0].candidate.laws == (("decoy", ""),)  # or this test would show nothing
+    grow(search, Thresholds())
+    refit, *others = (score(search.problem, one) for one in (search.refit, *search.finalists))
     chosen = select(refit, others, Thresholds())
     assert {name for name, _ in chosen.fit.candidate.laws} == set(TRUE)
     values = dict(zip((name for name, _ in chosen.fit.candidate.laws),

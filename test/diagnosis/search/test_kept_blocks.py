@@ -69,9 +69,9 @@ def record(hit: int) -> DrivenLog:
 @pytest.mark.parametrize("hit", [2, 3, 4])
 def test_a_stop_that_is_hit_once_is_found(hit: int) -> None:
     problem = Problem(Lag(), (record(hit),))
-    contest = compete(problem, Effort(), False, lambda share, what: None)
-    assert hit % SELECT_EVERY != contest.problem.turn  # the fit sees the hit
-    refit, *finalists = (score(contest.problem, f) for f in (contest.refit, *contest.finalists))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    assert hit % SELECT_EVERY != search.problem.fold  # the fit sees the hit
+    refit, *finalists = (score(search.problem, f) for f in (search.refit, *search.finalists))
     chosen = select(refit, finalists, Thresholds())
     assert chosen.fit.candidate.parts == (("stop", ""),)
-    assert contest.problem.values(chosen.fit.candidate, chosen.fit.x)[0] == pytest.approx(STOP, rel=0.1)
+    assert search.problem.values(chosen.fit.candidate, chosen.fit.x)[0] == pytest.approx(STOP, rel=0.1)
