@@ -136,7 +136,7 @@ def _unit(effect: str, parameter: str) -> str:
 def _excuse(hidden: NamedEffect, found: Mapping[str, Any]) -> str:
     if hidden.effect in found["ambiguity_group"]:
         return f"{hidden.effect} is among what these logs do not tell apart from it"
-    return "these logs have led it astray"
+    return "it is wrong on these logs"
 
 
 if __name__ == "__main__":

@@ -264,8 +264,8 @@ def _check(values: Values, target: Path) -> Rig:
     """Find every mistake before a process starts: rig, trim, effects, road and output file."""
     from pneumo_ros.road import PARAMETERS, build_road
 
-    rig = _standing_rig(str(values["road_profile"].get("rig", "")))
-    _standing_rig(str(values.get("plant", {}).get("simulated_rig", "")))
+    rig = _checked_rig(str(values["road_profile"].get("rig", "")))
+    _checked_rig(str(values.get("plant", {}).get("simulated_rig", "")))
     _check_profile(values, rig)
     own = {p.name: values["road_profile"].get(p.name, p.default) for p in PARAMETERS}
     build_road(own, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where="road")
@@ -276,7 +276,7 @@ def _check(values: Values, target: Path) -> Rig:
     return rig
 
 
-def _standing_rig(file: str) -> Rig:
+def _checked_rig(file: str) -> Rig:
     """A rig that stands at its trim, with effects that the library has; '' is the nominal one."""
     from pneumo_ros.plant.trim import trim
     from pneumo_ros.rig import load_rig
@@ -284,9 +284,9 @@ def _standing_rig(file: str) -> Rig:
     rig = load_rig(file or None)
     trim(rig)
     if rig.effects:
-        from pneumo_ros.effects.configured import library_of, standing_effects
+        from pneumo_ros.effects.configured import configured_effects, library_of
 
-        standing_effects(rig, library_of(rig))
+        configured_effects(rig, library_of(rig))
     return rig
 
 

@@ -104,7 +104,7 @@ def session_of(request: HTTPServerRequest) -> str:
     token = request.headers.get("Sec-WebSocket-Protocol", "").rpartition(",")[2].strip()
     try:
         return str(get_session_id(token))
-    except Exception:  # whatever a stranger's bytes do to a decoder
+    except Exception:  # whatever bytes from outside do to a decoder
         return ""
 
 

@@ -246,7 +246,7 @@ def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts |
     """Of what the nominal structure leaves, and of what the best named one leaves.
 
     The first starts at the nominal values: the search answers the tolerances itself, while those of the free-run refit
-    have bent to the gap already.
+    have absorbed part of the gap already.
     """
     if locate is None:
         return None, None
@@ -260,7 +260,7 @@ def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts |
 def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
     """A named effect's own places; else the places where a flexible correction of the nominal model helps.
 
-    Not of the best named structure: a wrong name has bent the model where it acts.
+    Not of the best named structure: a wrong name has changed the model where it acts.
     """
     model, holdout, runs = outcome.problem.model, outcome.holdout, outcome.runs
     if opinion.verdict != "unknown" and outcome.active:

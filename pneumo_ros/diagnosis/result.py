@@ -153,7 +153,7 @@ class BudgetEntry:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What no family of the structure closes: its share of the squared nominal gap, where, and its course there."""
+    """What no family of the structure closes: its share of the squared nominal gap, its places and measured law."""
 
     share: float
     places: tuple[str, ...] = ()

@@ -15,7 +15,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.rig import NamedEffect, Rig
 
 
-def standing_effects(rig: Rig, library: Mapping[str, Effect]) -> tuple[Active, ...]:
+def configured_effects(rig: Rig, library: Mapping[str, Effect]) -> tuple[Active, ...]:
     """The effects of a rig as the model takes them.
 
     Raises

@@ -165,7 +165,7 @@ class CorrectedRig:
     @property
     def names(self) -> str:
         """Effects and where they act."""
-        effects = (*self.model.standing, *self.active)
+        effects = (*self.model.configured, *self.active)
         return ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in effects) or "no effect"
 
     def _advanced(self, state: CorrectedState, command: Array, road: Array, period: float) -> tuple[Array, Array]:

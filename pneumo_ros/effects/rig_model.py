@@ -2,7 +2,7 @@
 """The half car as the diagnosis sees it: nuisance parameters from the rig's tolerances, effects, one compiled
 kernel.
 
-Effects that the rig's own configuration names (:attr:`RigModel.standing`) are in every simulation, before those that
+Effects that the rig's own configuration names (:attr:`RigModel.configured`) are in every simulation, before those that
 are asked for.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.effects.composition import CORRECTIONS, Compiled, Slot, compose
-from pneumo_ros.effects.configured import standing_effects
+from pneumo_ros.effects.configured import configured_effects
 from pneumo_ros.effects.contract import (
     SENSOR_PLACES,
     Effect,
@@ -137,18 +137,18 @@ class RigModel:
     def effects(self) -> Mapping[str, Effect]:
         """The effects that compete, at the sites that are left to them.
 
-        The kernel has one place for a term at an end: where a standing effect has taken it, no second one can compete.
+        The kernel has one place for a term at an end: where a configured effect has taken it, no second one competes.
         """
         free = {name: self._free(effect) for name, effect in self.library.items() if name not in self.withheld}
         return {name: effect for name, effect in free.items() if effect.sites}
 
     def _free(self, effect: Effect) -> Effect:
-        taken = [ends_of(one.site) for one in self.standing if one.effect == effect.id and effect.term is not None]
+        taken = [ends_of(one.site) for one in self.configured if one.effect == effect.id and effect.term is not None]
         sites = [s for s in effect.sites if not any(a and b for t in taken for a, b in zip(ends_of(s), t, strict=True))]
         return effect if len(sites) == len(effect.sites) else replace(effect, sites=tuple(sites))
 
     @cached_property
-    def standing(self) -> tuple[Active, ...]:
+    def configured(self) -> tuple[Active, ...]:
         """The effects that the rig's configuration names.
 
         Raises
@@ -156,7 +156,7 @@ class RigModel:
         InputError
             if one is not in the library, or its site, parameters or place in the kernel cannot be.
         """
-        return standing_effects(self.rig, self.library)
+        return configured_effects(self.rig, self.library)
 
     def places(self, active: Active) -> tuple[str, ...]:
         """Places touched, first the one blamed."""
@@ -187,7 +187,7 @@ class RigModel:
         """State at the record's first row: the measured one, seen through the active sensor effects."""
         state = np.asarray(record.initial, dtype=float)
         channels, rates = _channels(state, self._base.body), _ends_rates(state, self._base.body)
-        for one in reversed((*self.standing, *active)):
+        for one in reversed((*self.configured, *active)):
             effect = self.library[one.effect]
             if effect.undo is not None:
                 channels = effect.undo(channels.reshape(1, -1), channels_of(one.site), one.values)[0]
@@ -220,7 +220,7 @@ class RigModel:
     ) -> tuple[Array, Memories]:
         """What the sensors make of a block of rows (N, 6), and what their effects keep for the next block."""
         kept = []
-        for one, before in _with_memory((*self.standing, *active), memory):
+        for one, before in _with_memory((*self.configured, *active), memory):
             effect = self.library[one.effect]
             if effect.outputs is not None:
                 channels, before = effect.outputs(channels, period, channels_of(one.site), one.values, before)
@@ -232,7 +232,7 @@ class RigModel:
     ) -> tuple[Inputs, Memories]:
         """What of a block of commands and road acts on the plant, and what the effects keep for the next block."""
         kept = []
-        for one, before in _with_memory((*self.standing, *active), memory):
+        for one, before in _with_memory((*self.configured, *active), memory):
             effect = self.library[one.effect]
             if effect.inputs is not None:
                 inputs, before = effect.inputs(inputs, period, ends_of(one.site), one.values, before)
@@ -300,7 +300,7 @@ class RigModel:
                 found += [(int(row), column) for row in rows]
         return found
 
-    def led(self, record: Log, events: list[tuple[int, int]], lead: Array) -> Log:
+    def advanced(self, record: Log, events: list[tuple[int, int]], lead: Array) -> Log:
         """The record with jumps ``lead`` samples earlier: the row before takes that share of the jump."""
         commands = record.commands.copy()
         for (row, column), share in zip(events, lead, strict=True):
@@ -311,7 +311,7 @@ class RigModel:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""
         v = {} if nuisance is None else dict(zip((p.name for p in self.parameters), map(float, nuisance), strict=True))
         plant = _plant(self.rig, self._base, {**dict(self.rig.ends), **v})
-        for one in (*self.standing, *active):
+        for one in (*self.configured, *active):
             effect = self.library[one.effect]
             if effect.plant is not None:
                 plant = effect.plant(plant, ends_of(one.site), one.values)
@@ -338,8 +338,8 @@ class RigModel:
         return _base(self.rig, self.step)
 
     def terms(self, active: Sequence[Active] = ()) -> list[Active]:
-        """Those that act inside the kernel, the standing ones first."""
-        return [one for one in (*self.standing, *active) if self.library[one.effect].term is not None]
+        """Those that act inside the kernel, the configured ones first."""
+        return [one for one in (*self.configured, *active) if self.library[one.effect].term is not None]
 
     def inner(self) -> Array:
         """Room for the states of the kernel's terms, (K, 2, S)."""

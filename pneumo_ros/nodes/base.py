@@ -127,7 +127,7 @@ class RigNode(Node):
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
-        self.readiness = Readiness(self, name, str(self.values["session_id"]), self._on_stranger)
+        self.readiness = Readiness(self, name, str(self.values["session_id"]), self._on_other_session)
         self.ready = self.begun = False
         self._ready_timer: Timer = self.steady_timer(READY_PERIOD, self._look_for_subscribers)
         self.steady_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics)
@@ -224,7 +224,7 @@ class RigNode(Node):
         text = source.too_many(NAMING) if source.count > 1 else text
         self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
 
-    def _on_stranger(self, text: str) -> None:
+    def _on_other_session(self, text: str) -> None:
         # A session that runs goes on: the newcomer hears of it and ends. Its publishers are another matter.
         if not self.begun:
             self.fail("other_session", f"{text}; end it, or use --domain N or --isolate")
@@ -261,7 +261,7 @@ class RigNode(Node):
         for source in self.sources:
             if source.topic.publisher:
                 source.held = bool(self.values["session_id"])
-                source.refuse_stranger(self.readiness.publishers(source.topic))
+                source.refuse_other_publisher(self.readiness.publishers(source.topic))
         if not self.stop.set:
             self.on_begin()
 

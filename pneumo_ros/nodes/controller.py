@@ -19,7 +19,7 @@ from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.stages import ControllerStage, Course, advance
+from pneumo_ros.session.stages import ControllerStage, Progress, advance
 
 PARAMETERS: tuple[Parameter, ...] = (
     *CONTROL_PARAMETERS,
@@ -43,7 +43,7 @@ class ControllerNode(RigNode):
         self.rig = load_rig(self.values["rig"] or None)
         self.stage = self._build()
         self.stage.warm_up()
-        self.course: Course | None = None
+        self.progress: Progress | None = None
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
         self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
         self._publish = self.publisher(topics.COMMAND).publish
@@ -79,7 +79,7 @@ class ControllerNode(RigNode):
         if stamp <= self._said and stamp > self._last_stamp:
             return  # the safe command has overtaken this sample; a command's stamp never goes back
         self._last_ns, self._last_stamp, self._stale = start, stamp, False
-        self.course, output = advance(self.stage, self.course, stamp, estimate, self.period_ns)
+        self.progress, output = advance(self.stage, self.progress, stamp, estimate, self.period_ns)
         if output.refused:
             self._say_refused(stamp)
         self._said = stamp

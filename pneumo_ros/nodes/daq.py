@@ -29,7 +29,7 @@ from pneumo_ros.log.cdr import JointDecoder
 from pneumo_ros.nodes.base import ERROR, OK, WARN, RigNode
 from pneumo_ros.nodes.daq_output import MeasurementOutput, WallClock
 from pneumo_ros.nodes.daq_services import RigServices
-from pneumo_ros.nodes.daq_session import SessionCourse
+from pneumo_ros.nodes.daq_session import HardwareSession
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE
 from pneumo_ros.nodes.sources import SoleSource
 from pneumo_ros.nodes.spin import node_main
@@ -85,7 +85,7 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self._closed = tuple(self.safety.safe_command)
         self.reason = ""
         LifecycleNodeMixin.__init__(self)
-        self.course = SessionCourse(self)
+        self.session = HardwareSession(self)
 
     @property
     def hardware_id(self) -> str:
@@ -179,13 +179,13 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         """Valves safe and port closed before the last messages are delivered."""
         if self.driver is not None:
             self.driver.disarm()
-        self.course.tell_end()
+        self.session.tell_end()
         self.on_cleanup(LifecycleState("", 0))
         super().on_stop(executor)
 
     def on_begin(self) -> None:
         """Arm by itself, if that is wished."""
-        self.course.begin()
+        self.session.begin()
 
     # -- data ------------------------------------------------------------------------------------------------------
 

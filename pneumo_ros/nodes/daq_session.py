@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The course of a session on hardware: start when everybody is ready, deactivate on a trip, end after its duration."""
+"""A session on hardware: start when everybody is ready, deactivate on a trip, end after its duration."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PROGRESS_PERIOD = 0.2  # s between progress lines
 TRIPPED, NOT_STARTED = 1, 2  # exit codes
 
 
-class SessionCourse:
+class HardwareSession:
     """Triggers the node's transitions from the executor's thread, where they belong.
 
     Parameters

@@ -16,7 +16,7 @@ from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import load_rig
-from pneumo_ros.session.stages import Course, EstimatorStage, advance
+from pneumo_ros.session.stages import EstimatorStage, Progress, advance
 
 
 class EstimatorNode(RigNode):
@@ -27,7 +27,7 @@ class EstimatorNode(RigNode):
         self.rig = load_rig(self.values["rig"] or None)
         self.stage = self._build()
         self.stage.warm_up()
-        self.course: Course | None = None
+        self.progress: Progress | None = None
         self._sample = np.zeros(6)
         self._stamps = [0, 0, 0]
         self._encode = JointEncoder(topics.ESTIMATE.frame_id, topics.ESTIMATE.names).encode_array
@@ -58,7 +58,7 @@ class EstimatorNode(RigNode):
         if stamp != self._stamps[1] or stamp != self._stamps[2]:
             return
         start = time.monotonic_ns()
-        self.course, output = advance(self.stage, self.course, stamp, self._sample, self.period_ns)
+        self.progress, output = advance(self.stage, self.progress, stamp, self._sample, self.period_ns)
         self._publish(self._encode(stamp, output.values))
         self.timed(start)
 

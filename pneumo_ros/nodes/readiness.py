@@ -29,16 +29,16 @@ class Readiness:
     node : announces itself
     role : its name in the table of topics
     session : identity of the session, '' for nodes that were started by hand
-    on_stranger : called with a sentence when a node of another session speaks
+    on_other_session : called with a sentence when a node of another session speaks
 
     Attributes
     ----------
     ready : roles whose publishers have all their subscribers
     """
 
-    def __init__(self, node: Node, role: str, session: str, on_stranger: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, role: str, session: str, on_other_session: Callable[[str], None]) -> None:
         self.ready: set[str] = set()
-        self._node, self._role, self._session, self._on_stranger = node, role, session, on_stranger
+        self._node, self._role, self._session, self._on_other_session = node, role, session, on_other_session
         self._said: dict[str, Mapping[str, Any]] = {}
         self._announced = False
         qos = publisher_qos(READY.flow, lockstep=True)
@@ -79,10 +79,10 @@ class Readiness:
             said = json.loads(message.data)
             session, role = str(said["session"]), str(said["node"])
         except (ValueError, TypeError, KeyError):
-            self._on_stranger(f"{READY.name} carries {message.data[:60]!r}, which no node of a session says")
+            self._on_other_session(f"{READY.name} carries {message.data[:60]!r}, which no node of a session says")
             return
         if session != self._session:
-            self._on_stranger(f"{role} of another session ({session or 'started by hand'}) is here")
+            self._on_other_session(f"{role} of another session ({session or 'started by hand'}) is here")
         elif "publishers" in said:
             self._said[role] = said
         elif "ready" in said:

@@ -98,7 +98,7 @@ class SoleSource:
         self.bound = gid
         self._subscription.callback = self._callback
 
-    def refuse_stranger(self, announced: set[str]) -> None:
+    def refuse_other_publisher(self, announced: set[str]) -> None:
         """Say if the publisher is none of those that this session's nodes announced."""
         if self.bound and announced and self.bound not in announced:
             node = self.publishers().get(self.bound, "a node that has gone")

@@ -32,14 +32,14 @@ class OwnRig:
     description, physics : rig.yaml and rig.py
     scaling : what the logs say of the slots
     withheld : families that do not compete
-    standing : effects that a saved rig has
+    configured : effects that a saved rig has
     """
 
     description: Description
     physics: Physics
     scaling: Scaling
     withheld: frozenset[str] = frozenset()
-    standing: tuple[Active, ...] = ()
+    configured: tuple[Active, ...] = ()
     _scratch: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
     @property
@@ -101,7 +101,7 @@ class OwnRig:
 
     def initial(self, record: OwnRecord, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         """State at the record's first row, seen through the active sensor effects, and its standard deviation."""
-        seen = self._through_sensors(record, (*self.standing, *active))
+        seen = self._through_sensors(record, (*self.configured, *active))
         return start_state(self.description, self.physics, record, seen)
 
     def predict(
@@ -114,7 +114,7 @@ class OwnRig:
         self, record: OwnRecord, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
     ) -> tuple[Array, Array, Array]:
         """Channels (N, C), coordinates of the slots in the equations (N, K, 3) and what acts there (N, K)."""
-        acting = (*self.standing, *active)
+        acting = (*self.configured, *active)
         inputs = self.driven(record.inputs[:rows], record.period, acting)
         P, on = self.values(acting)
         S = self.scaling.inside.copy()
@@ -225,7 +225,7 @@ def own_rig(rig: Description, physics: Physics, records: Sequence[OwnRecord], wi
     if rig.scales:
         scaling = _saved(scaling, rig, physics)
     model = OwnRig(rig, physics, scaling, frozenset(withheld))
-    _check_standing(rig, model)
+    _check_configured(rig, model)
     model = OwnRig(rig, physics, scaling, frozenset(withheld), rig.effects)
     for w in windows:
         if not np.all(np.isfinite(model.predict(w.record, None, w.state, ()))):  # type: ignore[arg-type]
@@ -254,7 +254,7 @@ def _saved(scaling: Scaling, rig: Description, physics: Physics) -> Scaling:
     return Scaling(scaling.measures, inside, signals, scaling.mobility, scaling.substeps)
 
 
-def _check_standing(rig: Description, model: OwnRig) -> None:
+def _check_configured(rig: Description, model: OwnRig) -> None:
     for one in rig.effects:
         known = model.library.get(one.effect)
         if known is None or one.site not in known.sites or len(one.values) != len(known.by_site[one.site]):

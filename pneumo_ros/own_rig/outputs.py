@@ -118,7 +118,7 @@ def save_rig(found: Diagnosis, model: OwnRig, path: Path) -> Path:
     for name, estimate in found.nuisance.items():
         unit = "" if estimate.unit == "1" else f" {estimate.unit}"
         parameters[name] = f"{estimate.value:.{DIGITS}g} +- {min(estimate.std, _stated(model, name)):.4g}{unit}"
-    effects = (*model.standing, *found.active)
+    effects = (*model.configured, *found.active)
     table["parameters"] = parameters
     if effects:
         table["effects"] = [{"effect": a.effect, "site": a.site, "values": [float(f"{v:.{DIGITS}g}") for v in a.values]}

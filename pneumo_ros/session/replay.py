@@ -29,7 +29,7 @@ from pneumo_ros.log.topics import Topic
 from pneumo_ros.log.writing import interface
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.rig import Rig, load_rig
-from pneumo_ros.session.stages import ControllerStage, Course, EstimatorStage, Stage, advance
+from pneumo_ros.session.stages import ControllerStage, EstimatorStage, Progress, Stage, advance
 
 TABLES: dict[str, tuple[Parameter, ...]] = {"estimator": ESTIMATION_PARAMETERS, "controller": CONTROL_PARAMETERS}
 PATH = "valve_profile"  # the one parameter that names a file
@@ -291,16 +291,16 @@ def _run(
     encode = JointEncoder(topic.frame_id, topic.names).encode
     stage, waiting = build(wanted.start), list(wanted.changes)
     values, telemetry = [], []
-    course: Course | None = None
+    progress: Progress | None = None
     for stamp, sample in zip(given.stamp_ns.tolist(), given.values, strict=True):
-        after, output = advance(stage, course, stamp, sample, period_ns)
+        after, output = advance(stage, progress, stamp, sample, period_ns)
         if waiting and stamp >= waiting[0][0] - CHANGE_WINDOW_NS:
             said = recorded.get(stamp) if recorded is not None else None
             late = stamp >= waiting[0][0] + (CHANGE_WINDOW_NS if recorded is not None else 0)
             if late or (said is not None and said != encode(stamp, output.values.tolist())):
                 stage = build(waiting.pop(0)[1])
-                after, output = advance(stage, course, stamp, sample, period_ns)
-        course = after
+                after, output = advance(stage, progress, stamp, sample, period_ns)
+        progress = after
         values.append(output.values)
         telemetry.append(output.telemetry)
     shape = (len(values), -1)

@@ -51,7 +51,7 @@ class Stage(Protocol):
         """Load the compiled code, so that the first period is as short as the others."""
 
 
-class Course(NamedTuple):
+class Progress(NamedTuple):
     """How far a stage has come in a session: its state, and the stamps of its first and its last sample, ns."""
 
     state: Any
@@ -68,21 +68,23 @@ def continues(stamp_ns: int, last_ns: int, period_ns: int) -> bool:
     return 0 <= stamp_ns - last_ns <= GAP_PERIODS * period_ns
 
 
-def advance(stage: Stage, course: Course | None, stamp_ns: int, given: Array, period_ns: int) -> tuple[Course, Output]:
+def advance(
+    stage: Stage, progress: Progress | None, stamp_ns: int, given: Array, period_ns: int
+) -> tuple[Progress, Output]:
     """One sample of a session.
 
     Parameters
     ----------
-    course : how far the stage has come, or None before the first sample
+    progress : how far the stage has come, or None before the first sample
     stamp_ns : of the sample, ns
     given : what the stage takes, SI
     period_ns : control period, ns
     """
-    first_ns = stamp_ns if course is None else course.first_ns
-    if course is None or not continues(stamp_ns, course.last_ns, period_ns):
-        course = Course(stage.first(given), first_ns, stamp_ns)
-    state, output = stage.step(stage.placed(course.state, round((stamp_ns - first_ns) / period_ns)), given)
-    return Course(state, first_ns, stamp_ns), output
+    first_ns = stamp_ns if progress is None else progress.first_ns
+    if progress is None or not continues(stamp_ns, progress.last_ns, period_ns):
+        progress = Progress(stage.first(given), first_ns, stamp_ns)
+    state, output = stage.step(stage.placed(progress.state, round((stamp_ns - first_ns) / period_ns)), given)
+    return Progress(state, first_ns, stamp_ns), output
 
 
 class EstimatorStage:

@@ -198,7 +198,7 @@ SIGNAL_LAWS = (
     Law("scale", SENSOR, "a sensitivity that is off",
         (Knob("scale_error", "1", si.GAIN, lambda m: 0.05, -16.0, 40.0),)),
     Law("offset", SIGNALS, "a constant error", (Knob("offset", "{unit}", si.OFFSET, lambda m: 0.1 * m.travel, -MOST),)),
-    Law("curvature", SIGNALS, "a sensitivity that bends",
+    Law("curvature", SIGNALS, "a sensitivity that is not constant",
         (Knob("curvature", "1", si.SQUARE, lambda m: 0.05, -20.0, 20.0),)),
     Law("curvature.cubic", SIGNALS, "a sensitivity that changes with size",
         (Knob("cubic", "1", si.CUBE, lambda m: 0.05, -20.0, 20.0),)),

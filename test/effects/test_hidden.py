@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from pneumo_ros.effects.configured import standing_effects
+from pneumo_ros.effects.configured import configured_effects
 from pneumo_ros.effects.hidden import SELDOM_SHOWN, WIDEST, hidden_rig
 from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.plant.trim import trim
@@ -22,7 +22,7 @@ def test_every_draw_is_a_rig_that_stands_with_one_effect_of_the_library() -> Non
     drawn = [hidden_rig(load_rig(), LIBRARY, seed) for seed in SEEDS]
     for rig in drawn:
         trim(rig)
-        assert len(standing_effects(rig, LIBRARY)) == 1
+        assert len(configured_effects(rig, LIBRARY)) == 1
     names = {rig.effects[0].effect for rig in drawn}
     assert names == set(LIBRARY) - set(SELDOM_SHOWN)
 

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from pneumo_ros.cli.main import app
 from pneumo_ros.effects import library
 from pneumo_ros.effects.cache import cache_folder, kept
-from pneumo_ros.effects.configured import library_of, standing_effects, with_files
+from pneumo_ros.effects.configured import configured_effects, library_of, with_files
 from pneumo_ros.effects.loading import load_library, origin_of, origins
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.reading import STRING, read_log
@@ -93,13 +93,13 @@ def test_the_users_own_file_loads_from_beside_the_rig_file_with_its_path_shown(
     rig = load_rig(rig_file)
     assert rig.effects[0].file == str(file.resolve()) and not mark.exists()
     effects = library_of(rig)
-    assert mark.exists() and standing_effects(rig, effects)[0].effect == "tilted"
+    assert mark.exists() and configured_effects(rig, effects)[0].effect == "tilted"
     assert origins(effects) == [f"effect tilted is loaded from {file.resolve()} (SHA-256 {digest[:16]})"]
     published = rig.to_yaml()
     assert str(tmp_path) not in published and "file" not in published and digest in published
     assert parse_rig(published) == rig
     sent = with_files(parse_rig(published), [file])
-    assert standing_effects(sent, library_of(sent))[0].effect == "tilted"
+    assert configured_effects(sent, library_of(sent))[0].effect == "tilted"
 
 
 @pytest.mark.parametrize("name", ["../tilted.py", "/etc/passwd", "sub/tilted.py", "link.py"])
@@ -122,10 +122,10 @@ def test_another_source_than_the_recorded_one_is_refused(tmp_path: Path) -> None
     file.write_text(OWN + "# changed\n")
     rig = with_files(parse_rig(config(source=digest)), [file])
     with pytest.raises(InputError, match=f"another than the one that was recorded.*allowed: SHA-256 {digest[:16]}"):
-        standing_effects(rig, library_of(rig))
+        configured_effects(rig, library_of(rig))
     known = NamedEffect("lvdt_offset", "sprung_rear", (("offset", 1e-3),), digest)
     with pytest.raises(InputError, match='value "the package\'s own"'):
-        standing_effects(parse_rig(yaml.safe_dump({**yaml.safe_load(load_rig().to_yaml()),
+        configured_effects(parse_rig(yaml.safe_dump({**yaml.safe_load(load_rig().to_yaml()),
                                                    "effects": [known.to_dict()]})), LIBRARY)  # fmt: skip
 
 

@@ -59,4 +59,4 @@ def test_the_rig_as_found_is_the_one_that_was_fitted_and_lacks_nothing(followed:
     assert found.verdict == "none"
     assert found.gap.nominal == pytest.approx(first["gap"]["best"], rel=0.02)
     again = save_rig(found, task.model, followed / "again.yaml")
-    assert prepared(followed / "rig.py", [log], rig=again).model.standing == task.model.standing
+    assert prepared(followed / "rig.py", [log], rig=again).model.configured == task.model.configured

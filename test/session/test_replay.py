@@ -75,7 +75,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory, context: Context) -> Log:
     controller = nodes[3]
 
     def change() -> None:
-        if controller.course is not None and controller.course.last_ns > 1_600_000_000:
+        if controller.progress is not None and controller.progress.last_ns > 1_600_000_000:
             timer.cancel()
             controller.set_parameters([Parameter("pole", value=NEW_POLE)])
 

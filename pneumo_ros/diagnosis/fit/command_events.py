@@ -3,9 +3,9 @@
 
 A log holds the command once a sample, but it may be held over a shorter control period: a jump that the log shows at a
 row really happened up to one sample earlier. On a rig this costs about the sensor noise in the free-run error, more
-than a small effect does. The fraction of a sample by which each jump led is estimated, bounded to [0, 1], from the fit
-logs only, after the best candidate is known and for all candidates alike; held-out logs are predicted from what they
-hold.
+than a small effect does. The fraction of a sample by which each jump came earlier is estimated, bounded to [0, 1], from
+the fit logs only, after the best candidate is known and for all candidates alike; held-out logs are predicted from what
+they hold.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit
 
 PRIOR_STD = 0.5  # samples: a lead costs something, so that jumps nothing depends on stay where the log has them
-# The mean square must fall below this share, or the log's own times stand: jumps that really led take most of what a
-# right structure leaves, while a wrong one can always hide some of its error behind them.
+# The mean square must fall below this share, or the log's own times are kept: jumps that really came earlier make most
+# of what a right structure leaves, while a wrong one can always hide some of its error behind them.
 WORTH = 0.6
 TOO_COARSE = 400.0  # mean square in sigmas above which the structure is too wrong to time anything by it
 MOST_EVENTS = 600
@@ -34,7 +34,7 @@ class HasEvents(Protocol):
     def events(self, record: Any) -> list[tuple[int, int]]:
         """(row, column) of each jump: the first row that has the new value."""
 
-    def led(self, record: Any, events: list[tuple[int, int]], lead: Array) -> Any:
+    def advanced(self, record: Any, events: list[tuple[int, int]], lead: Array) -> Any:
         """The record with each jump ``lead`` (samples, 0..1) earlier, as the mean over the row before it."""
 
 
@@ -61,7 +61,7 @@ def timed(logged: Problem, current: Problem, best: Fit) -> Problem:
         return current
     lead, x = _leads(logged, replace(best, residual=logged.residual(best.candidate, best.x)), listed)
     split = np.split(lead, np.cumsum([len(events) for events in listed])[:-1])
-    records = tuple(model.led(r, e, x) for r, e, x in zip(logged.records, listed, split, strict=True))
+    records = tuple(model.advanced(r, e, x) for r, e, x in zip(logged.records, listed, split, strict=True))
     moved = replace(logged, records=records)
     after = fit(moved, best.candidate, x, best.jacobian, iterations=3)
     return moved if np.mean(after.residual[rows] ** 2) < WORTH * np.mean(best.residual[rows] ** 2) else current
@@ -75,7 +75,7 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
     for k, events in enumerate(listed):
         for event in events:
             records = list(problem.records)
-            records[k] = model.led(records[k], [event], np.ones(1))
+            records[k] = model.advanced(records[k], [event], np.ones(1))
             one = replace(problem, records=tuple(records))
             # Measurements and weights stay: only the prediction of this log moves.
             columns.append(

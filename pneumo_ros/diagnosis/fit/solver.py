@@ -2,7 +2,7 @@
 """Bounded robust least squares on the free-run error, by a projected Levenberg-Marquardt of its own.
 
 The cost is ``N_eff log(mean squared residual) + |prior|^2``: the likelihood when the size of the misfit is unknown and
-its samples are correlated. A structure that fits badly is thereby not allowed to bend the nuisance parameters with the
+its samples are correlated. A structure that fits badly is thereby not allowed to move the nuisance parameters with the
 weight of thousands of samples, and one that fits to the noise is held by the data alone. Large isolated residuals are
 down-weighted (Huber) at a threshold that follows the misfit.
 

@@ -79,7 +79,7 @@ def prepared(
     model = RigModel(own, library, frozenset(without))
     names = own_ids(library)
     told = [f"effects of your own that competed: {', '.join(names)}"] if names else []
-    notes = [*told, *origins(library), *_standing_notes(model)]
+    notes = [*told, *origins(library), *_configured_notes(model)]
     if holdout is None:
         check_pair(logs, None)
         logs, held = split_by_time(logs)
@@ -115,7 +115,7 @@ def _about_edit(model: RigModel, edit: Signals) -> list[str]:
     return notes
 
 
-def _standing_notes(model: RigModel) -> tuple[str, ...]:
+def _configured_notes(model: RigModel) -> tuple[str, ...]:
     """What the rig's configuration brings into the model beyond the nominal equations.
 
     Raises
@@ -123,9 +123,9 @@ def _standing_notes(model: RigModel) -> tuple[str, ...]:
     InputError
         if it names an effect that cannot be.
     """
-    if not model.standing:
+    if not model.configured:
         return ()
-    names = ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in model.standing)
+    names = ", ".join(f"{one.effect} ({one.site or 'rig'})" for one in model.configured)
     return (
         f"the rig's configuration names {names}: part of the model as stated there, of 'nominal' and 'refit' too; what "
         "competes is what the logs show beyond it",

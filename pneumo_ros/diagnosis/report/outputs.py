@@ -19,7 +19,7 @@ from pneumo_ros.diagnosis.report.steps import Asked
 from pneumo_ros.diagnosis.report.story import Story
 from pneumo_ros.diagnosis.result import Diagnosis, write_json
 from pneumo_ros.diagnosis.signals import Signals
-from pneumo_ros.diagnosis.where import Location, conditional_gaps, habitat, locate, missing_law, predict_located
+from pneumo_ros.diagnosis.where import Location, conditional_gaps, locate, missing_law, occurrence, predict_located
 from pneumo_ros.diagnosis.where.design import car_of
 from pneumo_ros.diagnosis.where.regimes import harmonics
 from pneumo_ros.effects.loading import laws_of, own_ids
@@ -116,7 +116,7 @@ def _one_of_a_kind(where: Location) -> list[str]:
 
 def _sentences(where: Location, holdout: Signals, error: Array) -> list[str]:
     """When the gap shows, and what its harmonics say where the road is one sine."""
-    out = [habitat(where, error).text]
+    out = [occurrence(where, error).text]
     found = harmonics(holdout.road, error, holdout.period)
     if found is not None:
         kind = "odd, as symmetric laws make them" if found.odd > found.even else "even, as one-sided laws make them"

@@ -351,7 +351,7 @@ def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = Non
     if anew is None or all(p.size for p in parameters):
         return best
     for values in starts_elsewhere(parameters, problem.values(best.candidate, best.x)):
-        # Not from where this fit ended: its tolerance parameters have bent to the shape it has.
+        # Not from where this fit ended: its tolerance parameters have adapted to the shape it has.
         start = problem.start(short.candidate, anew.x[: problem.fixed], values)
         other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
         if other.cost < best.cost - 1.0:

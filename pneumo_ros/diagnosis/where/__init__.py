@@ -11,5 +11,5 @@ from pneumo_ros.diagnosis.where.law import missing_law as missing_law
 from pneumo_ros.diagnosis.where.locate import Location as Location
 from pneumo_ros.diagnosis.where.locate import Start as Start
 from pneumo_ros.diagnosis.where.locate import locate as locate
-from pneumo_ros.diagnosis.where.regions import Habitat as Habitat
-from pneumo_ros.diagnosis.where.regions import habitat as habitat
+from pneumo_ros.diagnosis.where.regions import Occurrence as Occurrence
+from pneumo_ros.diagnosis.where.regions import occurrence as occurrence

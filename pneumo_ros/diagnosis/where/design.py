@@ -52,7 +52,8 @@ class Design:
     windows : where the K rows lie
     features : local motion of the log
     signals : the log
-    bends : sensor -> (K, 6) what its correction adds beside its columns, see :func:`with_sensor_columns`
+    nonlinear : place of a sensor -> (K, 6) what its correction changes beyond the linear columns, in null standard
+        deviations, see :func:`with_sensor_columns`
     """
 
     residual: Array
@@ -64,7 +65,7 @@ class Design:
     windows: Windows
     features: Features
     signals: Signals
-    bends: dict[str, Array] = field(default_factory=dict)
+    nonlinear: dict[str, Array] = field(default_factory=dict)
 
 
 def inputs_of(signals: Signals) -> Inputs:
@@ -110,8 +111,13 @@ def design_of(
 def with_sensor_columns(design: Design, model: RigModel, place: str, coefficients: Array) -> Design:
     """The same design with one sensor's columns taken at its estimated error.
 
-    The force of a spring bends with its height, and a stop has a corner: columns are tangents at the estimate, and what
-    the estimate itself changes beyond them is kept as the place's bend.
+    A spring's force is not linear in its height, and a stop has a corner. So the columns are the derivatives at the
+    estimate, and what the estimate changes beyond its linear part is kept in ``nonlinear``.
+
+    Parameters
+    ----------
+    place : of the sensor, "sensor:<channel>"
+    coefficients : its estimated error, one factor for each of the place's bases
     """
     rows = [k for k, basis in enumerate(design.bases) if basis.place == place]
     car, inputs = car_of(model), inputs_of(design.signals)
@@ -126,8 +132,8 @@ def with_sensor_columns(design: Design, model: RigModel, place: str, coefficient
     for k in rows:
         step = _column(design.bases[k], car, moved, design.windows, after, design.features, FIRST_SENSOR_STEP)
         columns[k] = step * whitened
-    bend = (after - before) * whitened - np.tensordot(coefficients, columns[rows], 1)
-    return replace(design, columns=columns, bends={**design.bends, place: bend})
+    rest = (after - before) * whitened - np.tensordot(coefficients, columns[rows], 1)
+    return replace(design, columns=columns, nonlinear={**design.nonlinear, place: rest})
 
 
 def sensor_noise(car: HalfCar, inputs: Inputs, windows: Windows, noise: Array, seed: int = 0) -> Array:

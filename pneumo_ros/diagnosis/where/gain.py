@@ -2,8 +2,8 @@
 """What a structure leaves in the equations, and how much better a flexible correction on top predicts held-out data.
 
 The judgement is independent of the free run that fitted the structure: effects act along the measured motion
-(:mod:`pneumo_ros.diagnosis.where.path_share`), so that a structure which bends the run towards the log with a wrong law
-is found out where its forces and flows are not those of the rig.
+(:mod:`pneumo_ros.diagnosis.where.path_share`), so that one which draws the free run towards the log with a wrong
+law is found out where its forces and flows are not those of the rig.
 """
 
 from __future__ import annotations

@@ -20,17 +20,16 @@ from pneumo_ros.diagnosis.where.design import Design, design_of, with_sensor_col
 from pneumo_ros.diagnosis.where.path_share import explained
 from pneumo_ros.diagnosis.where.sets import FLAT, LARGEST, Closing, best_subset, rivals, shapley, smallest
 from pneumo_ros.diagnosis.where.solve import Forms, Rows, forms_of
-from pneumo_ros.diagnosis.where.time_course import courses_of
+from pneumo_ros.diagnosis.where.time_course import time_courses_of
 from pneumo_ros.diagnosis.where.weak import EQUATIONS
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 
-# Shapes that close less than this of the held-out squared residual do not know the law: its course in time decides.
+# Shapes that close less than this of the held-out squared residual do not know the law: its time course decides.
 TRUSTED = 0.5
-COURSES = 2  # places in a set with free courses in time: more would follow anything
-SECOND = (
-    0.1  # of the squared residual that a second course must close: bumps 40 ms apart leave a few per cent themselves
-)
+MOST_TIME_COURSES = 2  # places with a free time course in one set: three would fit any residual
+# Share of the squared residual that a second time course must close: bumps 40 ms apart leave a few per cent themselves.
+SECOND = 0.1
 # Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops).
 SENSOR_PASSES = 3
 BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
@@ -56,7 +55,7 @@ class Start:
 
     def put_into(self, model: RigModel, design: Design) -> Design:
         """The design of a log without what the started model accounts for."""
-        if self.nominal and not model.standing:
+        if self.nominal and not model.configured:
             return design
         known = explained(model, design, self.values(model, np.zeros(len(model.parameters))), self.active)
         return replace(design, residual=design.residual - known * design.weight / design.null)
@@ -91,7 +90,7 @@ class Location:
     coefficients : of every basis, zero outside ``chosen``
     fit, judge : the fitted logs' problems and the judge's, for what comes after (regimes, simulation)
     followed : shapes of the chosen places follow what is missing there; if not, the places are known by the equations
-        that a free course in time closes (:mod:`pneumo_ros.diagnosis.where.time_course`)
+        that a free time course closes (:mod:`pneumo_ros.diagnosis.where.time_course`)
     """
 
     shares: tuple[tuple[str, float], ...]
@@ -142,8 +141,8 @@ def locate(model: RigModel, fit: Sequence[Signals], holdout: Signals, start: Sta
     closing: Closing = final
     followed = final.value(chosen) < (1.0 - TRUSTED) * refit_square
     if refit_square > FLAT**2 and not followed:
-        courses = courses_of(judge, model, offset)
-        closing, chosen = courses, smallest(courses, courses.candidates(), COURSES, SECOND)
+        courses = time_courses_of(judge, model, offset)
+        closing, chosen = courses, smallest(courses, courses.candidates(), MOST_TIME_COURSES, SECOND)
     return _location(closing, final, chosen, names, fitted, judge, start)
 
 
@@ -188,9 +187,9 @@ def corrected_residual(design: Design, nuisance: Array, coefficients: Array) -> 
     """Residuals (K, 6) in null standard deviations with parameters (in sigma) and corrections applied."""
     out = design.residual + np.tensordot(nuisance, design.parameters, 1) + np.tensordot(coefficients, design.columns, 1)
     corrected = {basis.place for basis, value in zip(design.bases, coefficients, strict=True) if value != 0.0}
-    for place, bend in design.bends.items():
+    for place, rest in design.nonlinear.items():
         if place in corrected:
-            out = out + bend
+            out = out + rest
     return np.asarray(out)
 
 
@@ -209,15 +208,15 @@ def _designs(model: RigModel, logs: Sequence[Signals], start: Start) -> list[Des
 
 def _flat(design: Design) -> Rows:
     columns = np.concatenate([design.parameters, design.columns])
-    bends = {place: bend.ravel() for place, bend in design.bends.items()}
-    return Rows(design.residual.ravel(), columns.reshape(len(columns), -1).T, bends)
+    nonlinear = {place: rest.ravel() for place, rest in design.nonlinear.items()}
+    return Rows(design.residual.ravel(), columns.reshape(len(columns), -1).T, nonlinear)
 
 
 def _stacked(designs: Sequence[Design]) -> Rows:
     parts = [_flat(design) for design in designs]
-    bends = {place: np.concatenate([part.bends[place] for part in parts]) for place in parts[0].bends}
+    nonlinear = {place: np.concatenate([part.nonlinear[place] for part in parts]) for place in parts[0].nonlinear}
     columns = np.concatenate([part.columns for part in parts])
-    return Rows(np.concatenate([part.residual for part in parts]), columns, bends)
+    return Rows(np.concatenate([part.residual for part in parts]), columns, nonlinear)
 
 
 def _halved(designs: Sequence[Design], offset: Array, places: Sequence[str]) -> Forms:

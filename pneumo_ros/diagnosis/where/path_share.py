@@ -41,7 +41,7 @@ def explained(model: RigModel, design: Design, nuisance: Array, active: Sequence
     inputs, active = inputs_of(signals), tuple(active)
     nominal, car = weak_residuals(car_of(model), inputs, windows), car_of(model, nuisance)
     bare = weak_residuals(car, inputs, windows)
-    if not active and not model.standing:
+    if not active and not model.configured:
         return nominal - bare
     initial = settle(model, signals, nuisance, active)
     missing, best, least = np.zeros_like(bare), bare, np.inf

@@ -14,7 +14,7 @@ from pneumo_ros.diagnosis.where.weak import EQUATIONS
 
 
 @dataclass(frozen=True)
-class Habitat:
+class Occurrence:
     """Where and when a gap shows.
 
     Attributes
@@ -44,7 +44,7 @@ class Habitat:
         return f"it shows mostly in one regime, {r.label}: {held}; {where}"
 
 
-def habitat(location: Location, error: Array | None = None, place: str | None = None) -> Habitat:
+def occurrence(location: Location, error: Array | None = None, place: str | None = None) -> Occurrence:
     """Where and when the refitted model's gap shows on the held-out log.
 
     Parameters
@@ -60,7 +60,7 @@ def habitat(location: Location, error: Array | None = None, place: str | None = 
     found = regimes(judge, residual, equation)
     step = float(np.diff(judge.windows.centres[:2])[0]) * judge.signals.period
     spread = bands(error, judge.signals.period) if error is not None else bands(_column(residual, equation), step)
-    return Habitat(where, equation, sharpest(found), max(spread, key=lambda band: band[2]), tuple(found))
+    return Occurrence(where, equation, sharpest(found), max(spread, key=lambda band: band[2]), tuple(found))
 
 
 def _column(residual: Array, equation: str) -> Array:

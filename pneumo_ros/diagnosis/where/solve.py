@@ -30,17 +30,17 @@ class Rows(NamedTuple):
     ----------
     residual : (n,)
     columns : (n, P + B) change by one unit of each parameter and each basis
-    bends : place -> (n,) what a correction there adds beside its columns (they are tangents; a sensor's error bends)
+    nonlinear : place -> (n,) what the correction of a sensor there changes beyond its linear columns
     """
 
     residual: Array
     columns: Array
-    bends: Mapping[str, Array]
+    nonlinear: Mapping[str, Array]
 
     def masked(self, rows: NDArray[np.bool_]) -> Rows:
         """The same with all other rows zero."""
-        bends = {place: bend * rows for place, bend in self.bends.items()}
-        return Rows(self.residual * rows, self.columns * rows[:, None], bends)
+        nonlinear = {place: rest * rows for place, rest in self.nonlinear.items()}
+        return Rows(self.residual * rows, self.columns * rows[:, None], nonlinear)
 
 
 @dataclass
@@ -51,17 +51,17 @@ class Forms:
     ----------
     parameters : P
     groups : place -> its columns
-    bends : place -> column of its bend
+    nonlinear : place -> number of its nonlinear part's column in the Gram matrices
     sizes : (B,) rms of each basis column over the fitted rows
-    fit, judge : Gram matrices of [columns, bends, residual]; the residual and the bends of corrected places enter with
-        coefficient one, the rest with the coefficients sought
+    fit, judge : Gram matrices of [columns, nonlinear, residual]; the residual and the nonlinear parts of corrected
+        places enter with coefficient one, the others with the coefficients sought
     rows : number of judged residuals
     offset : (P,) how many standard deviations from nominal the parameters already are: the prior holds the sum
     """
 
     parameters: int
     groups: dict[str, NDArray[np.intp]]
-    bends: dict[str, int]
+    nonlinear: dict[str, int]
     sizes: Array
     fit: Array
     judge: Array
@@ -97,7 +97,7 @@ class Forms:
         return self._solved(frozenset(places))[1]
 
     def _ones(self, places: Iterable[str]) -> NDArray[np.intp]:
-        return np.array([*(self.bends[place] for place in places if place in self.bends), len(self.fit) - 1])
+        return np.array([*(self.nonlinear[place] for place in places if place in self.nonlinear), len(self.fit) - 1])
 
     def _solved(self, places: frozenset[str]) -> tuple[float, Array]:
         if places not in self.cache:
@@ -121,13 +121,13 @@ def forms_of(fit: Rows, judge: Rows, offset: Array, places: Sequence[str]) -> Fo
     parameters, count = len(offset), fit.columns.shape[1]
     groups = {place: parameters + np.flatnonzero(np.asarray(places) == place) for place in dict.fromkeys(places)}
     sizes = np.sqrt(np.mean(fit.columns[:, parameters:] ** 2, axis=0)) + 1e-9
-    bends = {place: count + k for k, place in enumerate(fit.bends)}
+    nonlinear = {place: count + k for k, place in enumerate(fit.nonlinear)}
     rows = float(max(int(np.count_nonzero(judge.residual)), 1))
-    return Forms(parameters, groups, bends, sizes, _gram(fit), _gram(judge), rows, offset)
+    return Forms(parameters, groups, nonlinear, sizes, _gram(fit), _gram(judge), rows, offset)
 
 
 def _gram(rows: Rows) -> Array:
-    whole = np.column_stack([rows.columns, *rows.bends.values(), rows.residual])
+    whole = np.column_stack([rows.columns, *rows.nonlinear.values(), rows.residual])
     return np.asarray(whole.T @ whole)
 
 
@@ -146,7 +146,14 @@ def _bounded(gram: Array, cross: Array, offset: Array) -> Array:
 
 @njit(cache=True)
 def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
-    """Coordinate descent for x'Gx/2 - c'x, low <= x <= high, to 1e-5."""
+    """Minimum of x'Gx/2 - c'x inside a box, by coordinate descent until no coordinate moves by 1e-5.
+
+    Parameters
+    ----------
+    gram : (n, n) G, symmetric with a positive diagonal
+    cross : (n,) c
+    low, high : (n,) bounds of x
+    """
     x = np.minimum(np.maximum(np.zeros(len(cross)), low), high)
     gradient = gram @ x - cross
     for _ in range(3000):

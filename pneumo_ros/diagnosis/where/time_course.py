@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a gap lives when no shape follows it: which place's equations it moves together, whatever its course in time.
+"""Where a gap lives when no shape follows it: which place's equations it moves together, whatever its time course.
 
 A force that no function of the motion describes (a rotating imbalance, something that strikes, a law met outside what
 was fitted) defeats every shape of :mod:`pneumo_ros.diagnosis.where.flexible`. What gives its place away is the pattern
 across the equations in one window: a spring's force pushes the body up, turns it and pushes its axle down; a tyre's
-moves one axle only; air moves one balance. So a place may add *any* course in time, one value a window, and the price
-is what that many values take of noise. A sensor's error is a course of the channel, carried through the equations.
+moves one axle only; air moves one balance. So a place may add *any* time course, one value a window, and the price
+is what that many values take of noise. A sensor's error is a time course of the channel, carried through the equations.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from pneumo_ros.diagnosis.where.weak import EQUATIONS, averaged, weak_residuals
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar
 
-REACHED = 3  # windows on each side that a bump of a sensor's course moves: two of the bump, one of the window
-STEP = 0.05  # of a channel's standard deviation, to carry a course through the equations
+REACHED = 3  # windows on each side that a bump of a sensor's time course moves: two of the bump, one of the window
+STEP = 0.05  # of a channel's standard deviation, to carry a time course through the equations
 PRICE = 1.0  # mean square, null standard deviations, that one free value takes of noise
 RIDGE = 1e-6
 
 
 @dataclass
-class Courses:
-    """Free courses in time on one log, as a problem over sets of places.
+class TimeCourses:
+    """Free time courses on one log, as a problem over sets of places.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Courses:
     parameters : (P, K, 6) change by one standard deviation of each uncertain parameter
     offset : (P,) standard deviations that the parameters already are from nominal
     directions : place -> (D, K, 6) what its D free values of a window do to the equations of that window
-    spread : place -> (M, K, 6) what M values of a course do that reach further than their window (sensors)
+    spread : place -> (M, K, 6) what M values of a time course do that reach further than their window (sensors)
     """
 
     residual: Array
@@ -52,7 +52,7 @@ class Courses:
     cache: dict[frozenset[str], float] = field(default_factory=dict)
 
     def candidates(self) -> list[str]:
-        """Places that move an equation of this log; of the sensors the best alone, as two could follow anything."""
+        """Places that move an equation of this log; of the sensors the best alone: two could fit any residual."""
         sensors = sorted(self.spread, key=lambda place: self.value([place]))
         return [*self.directions, *sensors[:1]]
 
@@ -85,13 +85,13 @@ class Courses:
         return float((left @ left + PRICE * used) / self.rows)
 
 
-def courses_of(design: Design, model: RigModel, offset: Array) -> Courses:
+def time_courses_of(design: Design, model: RigModel, offset: Array) -> TimeCourses:
     """The problem of one log; places whose equations the log cannot test are left out."""
     car = car_of(model)
     whitened = design.weight / design.null
     directions = {place: moved * whitened for place, moved in _directions(design, car).items()}
     spread = {f"sensor:{name}": _course(design, car, c) * whitened for c, name in enumerate(MEASURED)}
-    return Courses(
+    return TimeCourses(
         design.residual,
         design.parameters,
         offset,
@@ -128,7 +128,7 @@ def _directions(design: Design, car: HalfCar) -> dict[str, Array]:
 
 
 def _course(design: Design, car: HalfCar, channel: int) -> Array:
-    """(M, K, 6) change of the residuals by each bump of one channel's course, null weights not applied.
+    """(M, K, 6) change of the residuals by each bump of one channel's time course, null weights not applied.
 
     Bumps (cubic B-splines, one a window) that lie too far apart to meet are carried through the equations together.
     """
@@ -168,7 +168,7 @@ def _complement(local: list[Array], shape: tuple[int, ...]) -> tuple[Array, floa
 
 
 def _without(courses: Array, residual: Array, columns: Array) -> tuple[Array, Array, float]:
-    """Residual and parameter columns with what courses (M, n) can follow taken off; and how many values they are."""
+    """Residual and parameter columns with what time courses (M, n) can follow taken off; and how many they are."""
     gram = courses @ courses.T
     size = float(np.trace(gram)) / len(gram)
     factor = cho_factor(gram + RIDGE * size * np.eye(len(gram)), check_finite=False)

@@ -84,7 +84,7 @@ def test_jumps_between_samples_are_timed(model: RigModel) -> None:
     events = model.events(inputs)
     assert len(events) == 22
     lead = np.random.default_rng(6).choice([0.0, 0.5], len(events))
-    truth = model.led(inputs, events, lead)
+    truth = model.advanced(inputs, events, lead)
     clean = model.simulate(truth, initial=trim(model.rig).state)
     problem = Problem(model, (signals_of(clean, road, commands, 1),))
     best = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
@@ -103,7 +103,7 @@ def test_jumps_that_a_wrong_structure_misplaced_are_put_back(model: RigModel) ->
     logged = Problem(model, (signals_of(model.simulate(inputs, initial=trim(model.rig).state), road, commands, 1),))
     events = model.events(logged.records[0])
     lead = np.random.default_rng(6).choice([0.0, 1.0], len(events))
-    wrong = Problem(model, (model.led(logged.records[0], events, lead),))
+    wrong = Problem(model, (model.advanced(logged.records[0], events, lead),))
     best = fit(wrong, Candidate(), wrong.start(Candidate(), None, ()), iterations=6)
     again = timed(logged, wrong, best)
     assert again is not wrong

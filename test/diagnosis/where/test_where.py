@@ -18,8 +18,8 @@ from pneumo_ros.diagnosis.where import (
     Start,
     conditional_gaps,
     flexible_gain,
-    habitat,
     locate,
+    occurrence,
     place_gaps,
     predict_located,
 )
@@ -303,7 +303,7 @@ def test_friction_shows_as_a_force_that_turns_with_velocity(model: RigModel) -> 
     residual = corrected_residual(judge, location.refit_nuisance, np.zeros(len(judge.columns)))
     mean = {r.label: r.mean for r in regimes(judge, residual, "rear_axle")}
     assert mean["fast extension"] > 2.0 and mean["fast compression"] < -2.0
-    assert habitat(location).place == "rear_force" and habitat(location).equation == "rear_axle"
+    assert occurrence(location).place == "rear_force" and occurrence(location).equation == "rear_axle"
 
 
 def test_the_subsystem_with_the_fault_leaves_the_log_when_run_alone(model: RigModel) -> None:
