@@ -88,3 +88,39 @@ def test_a_record_knows_its_gaps_and_its_timing(tmp_path: Path) -> None:
     timing: TopicTiming = record.topics[0]
     assert timing.missing == 40 and timing.rate == pytest.approx(100.0)
     assert "position" in CART_YAML and record.names == ("position",)
+
+
+STATIC = """
+from pneumo_ros.own_rig import Force, Sensor
+
+SLOTS = [
+    Force("seal", travel=lambda x, u, p: u.position, rate=lambda x, u, p: u.speed),
+    Sensor("force"),
+]
+
+
+def outputs(x, u, p, f):
+    return (p.stiffness * u.position + f.seal,)
+"""
+STATIC_YAML = """
+rig: drag
+time: {field: t, unit: s}
+channels:
+  force: {field: f, unit: N}
+inputs:
+  position: {field: x, unit: mm}
+  speed: {rate_of: position}
+parameters: {stiffness: 200 N/m}
+"""
+
+
+def test_a_rig_without_states_or_tolerances_is_diagnosed(tmp_path: Path) -> None:
+    """Nothing of the nominal model is unknown then."""
+    t = np.arange(0.0, 20.0, 0.01)
+    x = 0.02 * np.sin(2.0 * t) + 0.01 * np.sin(5.1 * t)
+    rub = -1.5 * np.tanh(np.gradient(x, t) / 1e-3)
+    force = 200.0 * x + rub + np.random.default_rng(1).normal(0.0, 0.01, len(t))
+    log = tmp_path / "log.csv"
+    np.savetxt(log, np.column_stack([t, 1e3 * x, force]), "%.6f", ",", header="t,x,f", comments="")
+    found = prepared(written(tmp_path, STATIC, STATIC_YAML), [log]).diagnose()
+    assert found.verdict == "coulomb_friction" and found.gap.best < 0.2 * found.gap.refit

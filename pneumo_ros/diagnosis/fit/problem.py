@@ -256,7 +256,8 @@ class Problem:
 
     def residual(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) measured - predicted, in sigmas."""
-        return (self.measured - self.predict(candidate, x)) * self.weight
+        with np.errstate(over="ignore", invalid="ignore"):  # a run that runs away: its cost is infinite
+            return (self.measured - self.predict(candidate, x)) * self.weight
 
 
 @lru_cache(maxsize=2)

@@ -70,7 +70,8 @@ def cost_of(
         return np.inf
     limit = HUBER * robust_scale(r)
     magnitude = np.abs(r)
-    rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
+    with np.errstate(over="ignore"):  # the branch that is not taken
+        rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
     return float(r.size / correlation * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
 
 
@@ -105,6 +106,8 @@ def fit(
     state = _evaluate(problem, candidate, np.clip(start, *bounds), rows)
     if state.diverged:
         return state
+    if not len(state.x):  # a rig without tolerances or states, as it is
+        return replace(state, jacobian=np.zeros((*state.residual.shape, 0)))
     shared = problem.fixed if shared is None else shared
     borrowed = None if jacobian is None else jacobian[:, :, :shared]
     columns: Array | None = None  # None: to be taken anew
@@ -232,7 +235,7 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     rho = np.where(w < 1.0, limit * (2.0 * magnitude - limit), r * r)
     strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + rho.mean()))
     root = np.sqrt(w)
-    A = (state.jacobian[rows] * root[:, :, None]).reshape(-1, len(state.x))
+    A = (state.jacobian[rows] * root[:, :, None]).reshape(r.size, len(state.x))
     prior = problem.prior(state.candidate)
     H = strength * (A.T @ A) + np.diag(prior + 1e-9)
     return H, strength * (A.T @ (r * root).ravel()) + prior * state.x

@@ -28,7 +28,7 @@ def covariance(problem: Problem, fit: Fit) -> Array:
     """
     assert fit.jacobian is not None
     free = _free(problem, fit)
-    J = fit.jacobian[:, :, free].reshape(-1, int(free.sum()))
+    J = fit.jacobian[:, :, free].reshape(fit.residual.size, int(free.sum()))
     prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)[free]
     strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
     size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)

@@ -118,7 +118,7 @@ class _Answer:
     def __init__(self, problem: Problem, best: Fit) -> None:
         assert best.jacobian is not None
         self.problem, self.best = problem, best
-        self.columns = best.jacobian[:, :, : problem.fixed].reshape(-1, problem.fixed)
+        self.columns = best.jacobian.reshape(best.residual.size, best.jacobian.shape[-1])[:, : problem.fixed]
         self.gram = self.columns.T @ self.columns
 
     def nuisance(self, kept: tuple[Part, ...]) -> Array:

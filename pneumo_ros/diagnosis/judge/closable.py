@@ -39,7 +39,8 @@ class EffectEvidence:
     own : gap left by the structure
     ceiling : gap left when whatever may act at its places is added
     share : what it holds of what the refit leaves
-    floor : what sensors and the stated model form leave anyway; 0 where no form is stated
+    leaves : what the structure leaves over what is left with whatever may act at its places: held-out gaps with nothing
+        subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated
     at_bounds : how many of its parameters stand at a bound that is no natural end of its law
     """
 
@@ -50,7 +51,7 @@ class EffectEvidence:
     ceiling: float
     share: float = 1.0
     at_bounds: float = 0.0
-    floor: float = 0.0
+    leaves: float = 1.0
 
     @property
     def family(self) -> str:
@@ -63,17 +64,6 @@ class EffectEvidence:
         whole = np.sqrt(self.without) - np.sqrt(min(self.ceiling, self.own))
         return float(np.clip((np.sqrt(self.without) - np.sqrt(self.own)) / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
 
-    @property
-    def leaves(self) -> float:
-        """What its family leaves, rms, over what anything at its places leaves; 1 where no model form is stated.
-
-        :data:`SLACK` of what there was to close counts as nothing.
-        """
-        if self.floor <= 0.0:
-            return 1.0
-        own, best = (float(np.sqrt(one + self.floor**2)) for one in (self.own, min(self.ceiling, self.own)))
-        return own / max(best + SLACK * float(np.sqrt(self.without)), 1e-12)
-
 
 @dataclass(frozen=True)
 class Remainder:
@@ -85,12 +75,14 @@ class Remainder:
     parts : what was added there
     fit : the structure with it, on all blocks
     gap : held-out gap left, mean square above floor and form
+    total : held-out gap left, as the contract's
     """
 
     places: tuple[str, ...]
     parts: tuple[Part, ...]
     fit: Fit
     gap: float
+    total: float
 
 
 @dataclass(frozen=True)
@@ -112,22 +104,26 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     floor : gap that sensors and the model's stated form leave, as the contract's gap
     places : further places of the contract where something may be missing, the likeliest first
     """
-    own = above(problem, best, holdout, floor)
-    stated = floor if getattr(holdout, "model_form", 0.0) > 0.0 else 0.0
+    left = held_by(problem, best, holdout).total
+    own = _above(left, floor)
+    stated = getattr(holdout, "model_form", 0.0) > 0.0
     remainders: dict[tuple[str, ...], Remainder] = {}
 
     def added(where: tuple[str, ...]) -> Remainder:
         if where not in remainders:
-            remainders[where] = _anything(problem, best, holdout, floor, where, own)
+            remainders[where] = _anything(problem, best, holdout, floor, where, left)
         return remainders[where]
 
     evidence = []
     for law in best.candidate.laws:
         where = problem.model.places(Active(*law, ()))
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
-        without = above(problem, bare, holdout, floor)
-        bounded = at_bounds(problem, best, of_law(best.candidate, law))
-        evidence.append(EffectEvidence(law, where, without, own, added(where).gap, at_bounds=bounded, floor=stated))
+        without, ceiling = held_by(problem, bare, holdout).total, added(where)
+        evidence.append(EffectEvidence(
+            law, where, _above(without, floor), own, ceiling.gap,
+            at_bounds=at_bounds(problem, best, of_law(best.candidate, law)),
+            leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated else 1.0,
+        ))  # fmt: skip
     if places:  # together, what is left may need them all; alone, one of them may do
         added(tuple(places[:TOGETHER]))
         added((places[0],))
@@ -135,19 +131,23 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     return Closable(tuple(evidence), tuple(found), own)
 
 
-def above(problem: Problem, one: Fit, holdout: Any, floor: float) -> float:
-    """Held-out gap, mean square above the floor."""
-    return max(held_by(problem, one, holdout).total ** 2 - floor**2, 0.0)
+def _above(gap: float, floor: float) -> float:
+    """Mean square of a gap above a floor."""
+    return max(gap**2 - floor**2, 0.0)
 
 
-def _anything(problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], own: float) -> Remainder:
+def _anything(
+    problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], left: float
+) -> Remainder:
+    """The structure with whatever may act at some places; ``left`` is its own held-out gap."""
     model = problem.model
     at = [model.anything_at(place) for place in where] if isinstance(model, HasCeilings) else []
     parts = tuple(dict.fromkeys(part for parts in at for part in parts))
     if not parts:
-        return Remainder(where, (), best, own)
+        return Remainder(where, (), best, _above(left, floor), left)
     found = with_parts(problem, best, parts, STEPS, _all(problem))
-    return Remainder(where, parts, found, above(problem, found, holdout, floor))
+    total = held_by(problem, found, holdout).total
+    return Remainder(where, parts, found, _above(total, floor), total)
 
 
 def _fitted(problem: Problem, one: Fit) -> Fit:

@@ -34,12 +34,15 @@ class Calibration:
     first_penalty, second_penalty : of log probability, for a first and a second effect: what chance wins
     closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
         "something else acts there"
-    leaves : what its family may leave, in what whatever may act there leaves, to be as likely
+    leaves : what its family may leave, in what whatever may act there leaves, to be as likely, where a model form is
+        stated
     steepness : exponent of these transitions
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
+    traces : what the refit leaves beyond the noise floor, in floors, at which it is as likely the work of traces that
+        every rig has, and of a floor that is known to a few per cent
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
@@ -47,12 +50,13 @@ class Calibration:
     first_penalty: float = 9.0
     second_penalty: float = 9.0
     closes: float = 0.5
-    leaves: float = 2.0
+    leaves: float = 1.35
     steepness: float = 4.0
     real: float = 2.5
     at_bounds: float = 0.9
     least: float = 0.002
     slight: float = 0.12
+    traces: float = 0.4
     held_real: float = 3.0
 
 
@@ -160,7 +164,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                one.at_bounds / c.at_bounds, c.least / max(one.share, 1e-9),
-               c.slight / max(closed, 1e-9)]  # fmt: skip
+               c.slight / max(closed, 1e-9), c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 
