@@ -21,6 +21,7 @@ from pneumo_ros.diagnosis.report.steps import Asked, Step, next_steps
 from pneumo_ros.diagnosis.report.words import (
     STANDS_OUT,
     UNNAMED,
+    closing_words,
     confidence,
     effect_name,
     forbidden,
@@ -28,7 +29,6 @@ from pneumo_ros.diagnosis.report.words import (
     how_far,
     percent,
     place_words,
-    structure_words,
     whole_percents,
     winner,
 )
@@ -264,7 +264,7 @@ def closest(summary: Mapping[str, Any]) -> str:
     if entry is None:
         return "no listed effect closes anything"
     left = float(summary["gap"]["refit"])
-    return (f"{structure_words(entry)} closes {percent(max(float(entry['shrink']), 0.0))} of the held-out gap that "
+    return (f"{closing_words(entry)} {percent(max(float(entry['shrink']), 0.0))} of the held-out gap that "
             f"re-estimated parameters leave ({left:.2g} → {float(entry['gap_after']):.2g})")  # fmt: skip
 
 
@@ -335,7 +335,7 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
     entries = [e for e in summary.get("ranking") or [] if name in e["effects"] and _finite(e)]
     if entries:
         best = min(entries, key=lambda e: float(e["gap_after"]))
-        return (f"{structure_words(best)} was fitted and closes {percent(max(float(best['shrink']), 0.0))} of the "
+        return (f"{closing_words(best, '{} fitted and ')} {percent(max(float(best['shrink']), 0.0))} of the "
                 f"held-out gap, probability {percent(float(best['probability']))}")  # fmt: skip
     if name in (summary.get("not_testable") or {}):
         return f"{name} could not have shown: {summary['not_testable'][name]}"

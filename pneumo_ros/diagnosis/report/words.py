@@ -166,4 +166,11 @@ def structure_words(entry: Mapping[str, Any]) -> str:
     parts = [
         (effect_name(effect), site_words(site or "")) for effect, site in zip(entry["effects"], sites, strict=True)
     ]
-    return " and ".join(f"{name} ({where})" if where else name for name, where in parts)
+    named = [f"{name} ({where})" if where else name for name, where in parts]
+    return " and ".join([", ".join(named[:-1]), named[-1]]) if len(named) > 1 else "".join(named)
+
+
+def closing_words(entry: Mapping[str, Any], verb: str = "") -> str:
+    """An entry of the ranking and what it does: "leak (front) closes", "leak (front) and valve lag together close"."""
+    was, closes = ("were", "together close") if len(entry["effects"]) > 1 else ("was", "closes")
+    return f"{structure_words(entry)} {verb.format(was)}{closes}"

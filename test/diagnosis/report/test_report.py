@@ -20,7 +20,15 @@ from pneumo_ros.diagnosis.report.quantities import readable, rounded
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
 from pneumo_ros.diagnosis.report.steps import Asked, next_steps
 from pneumo_ros.diagnosis.report.story import Known, gains, story
-from pneumo_ros.diagnosis.report.words import confidence, headline, interval, place_words, sentence, whole_percents
+from pneumo_ros.diagnosis.report.words import (
+    closing_words,
+    confidence,
+    headline,
+    interval,
+    place_words,
+    sentence,
+    whole_percents,
+)
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
 from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.effects.loading import load_library
@@ -296,6 +304,14 @@ def test_a_page_without_an_effect_paints_nothing() -> None:
     page = render(findings("none"))
     assert colour(1.0) not in page and colour(0.93) not in page and "#f06514" not in page.lower()
     assert "missing inflow" not in page and "nothing to name" in page and ">sure:" not in page
+
+
+def test_several_effects_close_together() -> None:
+    entry = {"effects": ["leak", "valve_lag", "bump_stop"], "sites": ["front", "both", "rear"]}
+    assert closing_words(entry) == "leak (front), valve lag (both ends) and bump stop (rear) together close"
+    assert (
+        closing_words({"effects": ["leak"], "side": "front"}, "{} fitted and ") == "leak (front) was fitted and closes"
+    )
 
 
 def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
