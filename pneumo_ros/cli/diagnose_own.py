@@ -50,7 +50,8 @@ def diagnose_own(
         if against is not None:
             rig = held.enter_context(fitted_own(console, against, model, rig, pairs))
         task = prepared(model, fit, holdout, rig, without)
-    threads = (os.cpu_count() or 1) if task.model.physics.kernel.compiled else 1
+    kernel = task.model.physics.kernel
+    threads = (os.cpu_count() or 1) if kernel.compiled and not kernel.alone else 1
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         options = Options(pairs=pairs, threads=threads)

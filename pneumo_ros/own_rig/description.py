@@ -13,10 +13,11 @@ from typing import Any
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError, not_one_of
+from pneumo_ros.own_rig.fmu.names import FmuNames, fmu_names
 from pneumo_ros.own_rig.quantities import Written, conversion, quantity
 
 KEYS = ("rig", "time", "start", "end", "channels", "inputs", "states", "parameters", "model_form", "families",
-        "effects", "scales")  # fmt: skip
+        "effects", "scales", "fmu")  # fmt: skip
 MODEL_FORM = 0.05  # a model on one page is seldom truer than this; state what yours is worth
 SIGNAL_KEYS = ("field", "topic", "unit", "sign", "noise", "hold", "beside", "rate_of", "default")
 
@@ -72,6 +73,7 @@ class Description:
     model_form : share of each channel's std that the maker holds the model form to be worth; 5 % unless stated
     families : slot's place -> families that may sit there
     effects, scales : of a rig that a diagnosis has saved: effects that stand, and their slots' scales
+    fmu : variables and slots of a model.fmu
     """
 
     name: str
@@ -88,6 +90,7 @@ class Description:
     families: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     effects: tuple[Active, ...] = ()
     scales: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    fmu: FmuNames | None = None
     raw: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
 
@@ -137,6 +140,7 @@ def _described(table: Mapping[str, Any], path: Path) -> Description:
         families={str(k): _names(v, path, f"families.{k}") for k, v in _table(table, "families", path).items()},
         effects=tuple(_effect(one, path) for one in _list(table, "effects", path)),
         scales={str(k): tuple(float(x) for x in v) for k, v in _table(table, "scales", path).items()},
+        fmu=fmu_names(table["fmu"], path) if "fmu" in table else None,
         raw=table,
     )
 

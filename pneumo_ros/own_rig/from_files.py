@@ -11,9 +11,9 @@ from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.competition import Progress
 from pneumo_ros.errors import InputError, not_one_of
-from pneumo_ros.own_rig.description import read_description
+from pneumo_ros.own_rig.description import Description, read_description
 from pneumo_ros.own_rig.model import OwnRig, own_rig
-from pneumo_ros.own_rig.physics import load_physics
+from pneumo_ros.own_rig.physics import Physics, load_physics
 from pneumo_ros.own_rig.records import FEWEST, OwnRecord, read_record
 from pneumo_ros.own_rig.whereabouts import whereabouts
 from pneumo_ros.slots.laws import LAWS
@@ -49,7 +49,7 @@ def prepared(
 
     Parameters
     ----------
-    model, rig : rig.py and its YAML; by default the one of the same name beside it
+    model, rig : rig.py or model.fmu and its YAML; by default the one of the same name beside it
     fit, holdout : logs; without a held-out one the end of the last fitted one is held out
     without : families that do not compete
 
@@ -65,7 +65,7 @@ def prepared(
         if name not in families:
             raise not_one_of("unknown family", name, families, key="without")
     description = read_description(rig_file_of(model, rig))
-    physics = load_physics(model, description)
+    physics, description = _loaded(model, description)
     records = [read_record(path, description) for path in fit]
     notes = []
     if not physics.kernel.compiled:
@@ -82,6 +82,14 @@ def prepared(
         notes.append(f"the rig file names {names}: part of the model as stated there; what competes is what the logs "
                      "show beyond it")  # fmt: skip
     return OwnTask(own_rig(description, physics, logs, without), tuple(logs), held, tuple(notes))
+
+
+def _loaded(model: Path, description: Description) -> tuple[Physics, Description]:
+    if model.suffix.lower() != ".fmu":
+        return load_physics(model, description), description
+    from pneumo_ros.own_rig.fmu.model import load_fmu  # fmpy only where it is needed
+
+    return load_fmu(model, description)
 
 
 def _check_alike(logs: Sequence[OwnRecord], held: OwnRecord) -> None:

@@ -57,6 +57,9 @@ class Kernel:
     derivative, coordinates : the user's own, of arrays, written into their last argument
     compiled : whether numba compiled it
     why_not : numba's first line where it did not
+    alone : whether one run must end before the next begins
+    mobility : (slot, state, inputs, held, period, parameters) -> change of its rate in a second for a unit of its
+        force, of a model that has no derivative
     """
 
     run: Callable[..., tuple[Array, Array, Array]]
@@ -64,6 +67,8 @@ class Kernel:
     coordinates: Callable[..., None]
     compiled: bool
     why_not: str = ""
+    alone: bool = False
+    mobility: Callable[..., float] | None = None
 
 
 def build(
@@ -105,15 +110,21 @@ def tried(kernel: Kernel, names: Names, slots: int) -> tuple[Array, Array, Array
 def _module(names: Names, own: dict[str, Any], shape: Sequence[int], source: str, compiled: bool) -> ModuleType:
     """The generated module with the user's functions put where it calls them."""
     text = _text(names, own["rhs"] is not None, shape, compiled and self_contained(source), compiled, source)
-    name = f"own_rig_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
+    module = kept_module("own_rig", text)
+    for key, function in own.items():
+        plain = getattr(function, "py_func", function)
+        setattr(module, key, njit(error_model="numpy")(plain) if compiled and function is not None else plain)
+    return module
+
+
+def kept_module(prefix: str, text: str) -> ModuleType:
+    """A module of generated text, in the user's cache under a name that holds its hash."""
+    name = f"{prefix}_{hashlib.sha256(text.encode()).hexdigest()[:20]}"
     path = kept(f"{name}.py", text.encode())
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = sys.modules[name] = importlib.util.module_from_spec(spec)  # numba finds what it kept by this name
     spec.loader.exec_module(module)
-    for key, function in own.items():
-        plain = getattr(function, "py_func", function)
-        setattr(module, key, njit(error_model="numpy")(plain) if compiled and function is not None else plain)
     return module
 
 
@@ -143,6 +154,7 @@ def _text(names: Names, states: bool, shape: Sequence[int], cached: bool, compil
     lines += _assigned(f"rhs({x}, {u}, {p}, {f})", len(names.states)) if states else [" pass"]
     lines += ["@compiled", "def reading(x, u, p, f, out):"]
     lines += _assigned(f"outputs({x}, {u}, {p}, {f})", len(names.channels))
+    lines += ["@compiled", "def settle(x, u, p):", " pass"]
     lines += ["@compiled", "def coordinates(x, u, p, out):", f" x = {x}", f" u = {u}", f" p = {p}"]
     lines += [f" out[{k}, {j}] = c{k}_{j}(x, u, p)" for k, count in enumerate(shape) for j in range(count)]
     body = [line for line in inspect.getsource(loop).splitlines()

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.own_rig.bridge import CHANNELS, compiled, coordinates, derivative, reading
+from pneumo_ros.own_rig.bridge import CHANNELS, compiled, coordinates, derivative, reading, settle
 from pneumo_ros.slots.flow import advance as advance_flow
 from pneumo_ros.slots.flow import flow
 from pneumo_ros.slots.flow import start as start_flow
@@ -129,5 +129,6 @@ def run(
                 between(u, held, i, k, substeps, ends)
                 if len(x) > 0:
                     step(x, ends, h, p, terms, on, P, S, c, z, f, K, trial)
+                settle(x, ends[2], p)
                 advance(x, ends[2], p, terms, on, P, S, h, c, z)
     return out, where, acted

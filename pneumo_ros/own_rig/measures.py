@@ -195,7 +195,12 @@ class Scaler:
     def _mobility(self, k: int) -> float:
         """By differences at the first window: of the slot's rate over the states, and of the states over its force."""
         slot, w = self.physics.inside[k], self.windows[0]
-        if not isinstance(slot, Force) or len(w.state) == 0:
+        if not isinstance(slot, Force):
+            return 0.0
+        if self.physics.kernel.mobility is not None:
+            found = self.physics.kernel.mobility(k, w.state, w.record.inputs, self.held, self.period, self.nominal)
+            return found if np.isfinite(found) else 0.0
+        if len(w.state) == 0:
             return 0.0
         slots, u = len(self.physics.inside), w.record.inputs[0]
         f = np.zeros(slots)

@@ -7,7 +7,7 @@ import hashlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -116,21 +116,32 @@ def _slots(module: ModuleType, path: Path, rig: Description) -> tuple[Slot, ...]
     if not isinstance(slots, (list, tuple)) or not slots or not all(isinstance(one, Slot) for one in slots):
         raise InputError("no slots", where=path, key="SLOTS",
                          allowed="a list of Force, Contact, Flow, Input, Sensor")  # fmt: skip
-    places = [one.place for one in slots]
-    for one in slots:
-        if places.count(one.place) > 1:
-            raise InputError("two slots of one name", where=path, key="SLOTS", value=one.name, remedy="name them apart")
-        if not usable_name(one.name):
-            raise InputError("not a name that Python can use", where=path, key="SLOTS", value=one.name,
-                             allowed="letters, digits and _")  # fmt: skip
-        known = rig.channels if one.kind == "sensor" else rig.inputs
-        if one.kind in ("input", "sensor") and one.name not in known:
-            raise not_one_of(f"no such {one.kind}", one.name, known, where=path, key="SLOTS")
-    _check_families(rig, slots)
+    check_slots(slots, rig, path, "SLOTS")
     return tuple(slots)
 
 
-def _check_families(rig: Description, slots: list[Slot] | tuple[Slot, ...]) -> None:
+def check_slots(slots: Sequence[Slot], rig: Description, path: Path, key: str) -> None:
+    """Names apart and usable, signals that the rig file has, families that fit.
+
+    Raises
+    ------
+    InputError
+        naming the entry.
+    """
+    places = [one.place for one in slots]
+    for one in slots:
+        if places.count(one.place) > 1:
+            raise InputError("two slots of one name", where=path, key=key, value=one.name, remedy="name them apart")
+        if not usable_name(one.name):
+            raise InputError("not a name that Python can use", where=path, key=key, value=one.name,
+                             allowed="letters, digits and _")  # fmt: skip
+        known = rig.channels if one.kind == "sensor" else rig.inputs
+        if one.kind in ("input", "sensor") and one.name not in known:
+            raise not_one_of(f"no such {one.kind}", one.name, known, where=path, key=key)
+    _check_families(rig, slots)
+
+
+def _check_families(rig: Description, slots: Sequence[Slot]) -> None:
     kinds = {one.place: one.kind for one in slots}
     for place, families in rig.families.items():
         if place not in kinds:
