@@ -103,7 +103,7 @@ docs: $(READY)  ## Write the generated tables of docs/ anew
 	$(BIN)/python -m pneumo_ros.cli.reference
 
 lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
-	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra parquet --extra view --extra dev \
+	uv pip compile setup.py --universal --python-version 3.10 --extra ros --extra cluster --extra fmu --extra parquet --extra view --extra dev \
 		--generate-hashes --no-emit-index-url --no-annotate --no-header --output-file requirements.lock
 
 clean:  ## Remove the virtual environment and what was built

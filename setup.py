@@ -69,6 +69,7 @@ setup(
     extras_require={
         "ros": ROS_WHEELS,
         "cluster": ["distributed>=2024.1"],
+        "fmu": ["fmpy>=0.3.32,<0.4"],
         "parquet": ["pyarrow>=15"],
         "view": ["bokeh>=3.4,<4"],
         "test": TESTING,

@@ -68,8 +68,10 @@ def diagnose(
     rig_model: Annotated[
         Path | None,
         typer.Option(
-            help="A rig of your own: its physics (rig.py, with rig.yaml beside it, or --rig). Logs may then be tables: "
-            "CSV, Parquet, .mat (docs/your-rig.md)."
+            "--rig-model",
+            "--fmu",
+            help="A rig of your own: its physics, rig.py or model.fmu, with the YAML of that name beside it, or --rig. "
+            "Logs may then be tables: CSV, Parquet, .mat (docs/your-rig.md, docs/fmu.md).",
         ),
     ] = None,
     against: Annotated[

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""FMUs built by the tests themselves: one C file, compiled with the headers that fmpy ships, zipped with a description."""
+"""FMUs built by the tests themselves: one C file, compiled with fmpy's headers, zipped with a description."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from scipy.integrate import solve_ivp
 
 SOURCE = Path(__file__).parents[1] / "data" / "fmu.c"
 PARAMETER = 'causality="parameter" variability="tunable" initial="exact"'
@@ -35,7 +39,7 @@ rig: base-excited frame
 time: {field: t, unit: s}
 channels: {floor: {field: x, unit: mm}}
 inputs:
-  base: {field: y, unit: mm, beside: [_x.mat, _y.mat]}
+  base: {field: y, unit: mm}
   base_speed: {rate_of: base}
 states: {floor: floor, speed: rate of floor}
 parameters: {mass: 3.0799 +- 0.03 kg, damping: 0.669 +- 0.13 N s/m, stiffness: 1191 +- 24 N/m}
@@ -139,3 +143,23 @@ def with_names(fmu: Path, names: str = FRAME_YAML) -> Path:
     """The FMU with its YAML beside it."""
     fmu.with_suffix(".yaml").write_text(names, encoding="utf-8")
     return fmu
+
+
+def frame_log(path: Path, friction: float = 1.3, seconds: float = 5.0) -> Path:
+    """The frame on a base that shakes at 1 Hz, with dry friction against the ground that turns over within 0.5 mm/s."""
+    period = 0.01
+    t = np.arange(0.0, seconds, period)
+    turn = 2.0 * np.pi
+
+    def base(time: Any) -> Any:
+        return 1.8e-3 * np.sin(turn * time) + 0.3e-3 * np.sin(2.3 * turn * time)
+
+    def rates(time: float, z: np.ndarray) -> list[float]:
+        speed = 1.8e-3 * turn * np.cos(turn * time) + 0.3e-3 * 2.3 * turn * np.cos(2.3 * turn * time)
+        force = -1200.0 * (z[0] - base(time)) - 0.7 * (z[1] - speed) - friction * np.tanh(z[1] / 5e-4)
+        return [z[1], force / 3.08]
+
+    x = solve_ivp(rates, (0.0, t[-1]), (0.0, 0.0), t_eval=t, method="LSODA", rtol=1e-8, atol=1e-10).y[0]
+    x += np.random.default_rng(5).normal(0.0, 5e-6, len(t))
+    np.savetxt(path, np.column_stack([t, 1e3 * x, 1e3 * base(t)]), "%.6f", ",", header="t,x,y", comments="")
+    return path

@@ -14,18 +14,20 @@ compiled = njit(error_model="numpy", nogil=True, cache=True)
 
 @compiled
 def set2(p: Any, references: Any, values: Array) -> int:
-    """Set numbers, FMI 2."""
-    if len(references) == 0:
+    """Set numbers by the address of their references, FMI 2."""
+    n = len(values)
+    if n == 0:
         return 0
-    return int(p.set_values(p.instance, references.ctypes.data, len(references), values.ctypes.data))
+    return int(p.set_values(p.instance, references, n, values.ctypes.data))
 
 
 @compiled
 def get2(p: Any, references: Any, values: Array) -> int:
-    """Get numbers, FMI 2."""
-    if len(references) == 0:
+    """Get numbers by the address of their references, FMI 2."""
+    n = len(values)
+    if n == 0:
         return 0
-    return int(p.get_values(p.instance, references.ctypes.data, len(references), values.ctypes.data))
+    return int(p.get_values(p.instance, references, n, values.ctypes.data))
 
 
 @compiled
@@ -36,27 +38,27 @@ def step2(p: Any, time: float, h: float) -> int:
 
 @compiled
 def set3(p: Any, references: Any, values: Array) -> int:
-    """Set numbers, FMI 3."""
-    n = len(references)
+    """Set numbers by the address of their references, FMI 3."""
+    n = len(values)
     if n == 0:
         return 0
-    return int(p.set_values(p.instance, references.ctypes.data, n, values.ctypes.data, n))
+    return int(p.set_values(p.instance, references, n, values.ctypes.data, n))
 
 
 @compiled
 def get3(p: Any, references: Any, values: Array) -> int:
-    """Get numbers, FMI 3."""
-    n = len(references)
+    """Get numbers by the address of their references, FMI 3."""
+    n = len(values)
     if n == 0:
         return 0
-    return int(p.get_values(p.instance, references.ctypes.data, n, values.ctypes.data, n))
+    return int(p.get_values(p.instance, references, n, values.ctypes.data, n))
 
 
 @compiled
 def step3(p: Any, time: float, h: float) -> int:
     """Let a co-simulation step, FMI 3; one that stops early or ends has failed."""
-    p.flags[:] = 0
-    flags = p.flags
+    flags = p.state[2:]
+    flags[:] = 0
     status = int(p.step(p.instance, time, h, True, flags[0:].ctypes.data, flags[1:].ctypes.data, flags[2:].ctypes.data,
-                        p.told.ctypes.data))  # fmt: skip
+                        p.after[1:].ctypes.data))  # fmt: skip
     return 3 if flags[1] or flags[2] else status

@@ -25,7 +25,8 @@ def drive(x: Array, u: Array, p: Any) -> bool:
     if p.state[0] != 0:
         return False
     last = len(u) - 1
-    p.values[:last] = u[:last]
+    for j in range(last):  # slices cost ten times what the calls do
+        p.values[j] = u[j]
     status = p.set_time(p.instance, u[last])
     if len(x) > 0:
         status = max(status, p.set_states(p.instance, x.ctypes.data, len(x)))
@@ -38,7 +39,8 @@ def drive(x: Array, u: Array, p: Any) -> bool:
 @compiled
 def derivative(x: Array, u: Array, p: Any, f: Array, out: Array) -> None:
     """Rates of the states, into ``out``; NaN after a failure."""
-    p.values[len(u) - 1 :] = f
+    for k in range(len(f)):
+        p.values[len(u) - 1 + k] = f[k]
     if drive(x, u, p) and p.rates(p.instance, out.ctypes.data, len(out)) > 1:
         p.state[0] = 1
     if p.state[0] != 0:
@@ -48,7 +50,8 @@ def derivative(x: Array, u: Array, p: Any, f: Array, out: Array) -> None:
 @compiled
 def reading(x: Array, u: Array, p: Any, f: Array, out: Array) -> None:
     """The measured channels, into ``out``; NaN after a failure."""
-    p.values[len(u) - 1 :] = f
+    for k in range(len(f)):
+        p.values[len(u) - 1 + k] = f[k]
     if drive(x, u, p) and get_values(p, p.read, out) > 1:
         p.state[0] = 1
     if p.state[0] != 0:
@@ -58,7 +61,8 @@ def reading(x: Array, u: Array, p: Any, f: Array, out: Array) -> None:
 @compiled
 def coordinates(x: Array, u: Array, p: Any, out: Array) -> None:
     """Coordinates (K, 3) of the slots, into ``out``, while nothing acts there."""
-    p.values[len(u) - 1 :] = 0.0
+    for k in range(len(out)):
+        p.values[len(u) - 1 + k] = 0.0
     if drive(x, u, p) and get_values(p, p.seen, p.numbers) > 1:
         p.state[0] = 1
     for k in range(out.shape[0]):
@@ -73,17 +77,15 @@ def settle(x: Array, u: Array, p: Any) -> None:
     """At the end of a step: where an indicator has changed its sign or a change is due, the instance settles."""
     if p.state[1] == 0 or not drive(x, u, p):
         return
-    p.flags[:] = 0
-    status = p.completed(p.instance, True, p.flags[0:].ctypes.data, p.flags[1:].ctypes.data)
-    due = p.flags[0] != 0 or u[len(u) - 1] >= p.following[0] - WHOLE
-    if len(p.now) > 0:
-        status = max(status, p.indicators(p.instance, p.now.ctypes.data, len(p.now)))
-        for i in range(len(p.now)):
-            due = due or (p.now[i] > 0.0) != (p.before[i] > 0.0)
-    if status > 1 or p.flags[1] != 0:
+    flags, last, now = p.state[2:], p.signs[0], p.signs[1]
+    flags[:] = 0
+    status = p.completed(p.instance, True, flags.ctypes.data, flags[1:].ctypes.data)
+    due = flags[0] != 0 or u[len(u) - 1] >= p.after[0] - WHOLE
+    if len(now) > 0:
+        status = max(status, p.indicators(p.instance, now.ctypes.data, len(now)))
+        for i in range(len(now)):
+            due = due or (now[i] > 0.0) != (last[i] > 0.0)
+    if status > 1 or flags[1] != 0 or (due and p.event() != 0):
         p.state[0] = 1
     elif due:
-        if p.event() != 0:
-            p.state[0] = 1
-        else:
-            x[:] = p.settled
+        x[:] = p.after[2:]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What compiled code needs of an instance: its functions by address, its variables by number, and room to work in.
 
-It travels through the loop in the place of the parameters, which the instance holds itself.
+It travels through the loop in the place of the parameters, which the instance holds itself. Arrays are few: each is
+counted whenever a function is given the handle, which costs more than the calls do.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.own_rig.fmu.variables import References, Variables
 
 FAILED, EVENTS = 0, 1  # entries of ``state``: the instance must be reset; it may change abruptly
+NEXT, STATES = 0, 2  # entries of ``after``
 FAILURE = 3  # a status of FMI
 EVENT = CFUNCTYPE(c_int)  # lets the instance settle after a change; 0 if it did
 
@@ -33,19 +35,15 @@ class Handle(NamedTuple):
     indicators: Any
     step: Any
     event: Any
-    driven: References
-    values: Array  # of ``driven``: inputs, then what acts at the slots
-    read: References
-    seen: References
-    numbers: Array  # of ``seen``
-    weights: Array
-    state: Any  # (2,) integers
-    flags: Any  # (4,) integers that the instance writes
-    told: Array  # (1,) where the instance writes how far it came
-    before: Array  # event indicators
-    now: Array
-    following: Array  # (1,) s, the next change that is known beforehand
-    settled: Array  # states after a change
+    driven: Any  # address of the references of ``values``
+    read: Any  # address of those of the channels
+    seen: Any  # address of those of ``numbers``
+    values: Array  # inputs, then what acts at the slots
+    numbers: Array  # that the coordinates are made of
+    weights: Array  # (3 K, len(numbers)) that make them
+    state: Any  # (6,) integers: failed, may change abruptly, and four flags that the instance writes
+    after: Array  # s the next change that is known beforehand, s how far a step came, states after a change
+    signs: Array  # (2, Z) event indicators before and now
 
 
 def handle_of(fmu: Any, version: int, variables: Variables, indicators: int, event: Callable[[], int]) -> Handle:
@@ -56,31 +54,31 @@ def handle_of(fmu: Any, version: int, variables: Variables, indicators: int, eve
     AttributeError
         if the library lacks a function.
     """
-    slots = len(variables.weights) // 3
     names, types = _functions(version, variables.exchange)
     found = {key: _function(fmu.dll, names.get(key), types[key]) for key in types}
     return Handle(
         instance=np.uint64(_address(fmu.component)),
         **found,
         event=EVENT(event),
-        driven=variables.driven,
+        driven=_start(variables.driven),
+        read=_start(variables.read),
+        seen=_start(variables.seen),
         values=np.zeros(len(variables.driven)),
-        read=variables.read,
-        seen=variables.seen,
         numbers=np.zeros(len(variables.seen)),
-        weights=np.ascontiguousarray(variables.weights.reshape(slots * 3, len(variables.seen))),
-        state=np.zeros(2, dtype=np.int64),
-        flags=np.zeros(4, dtype=np.int64),
-        told=np.zeros(1),
-        before=np.zeros(indicators),
-        now=np.zeros(indicators),
-        following=np.full(1, np.inf),
-        settled=np.zeros(len(variables.states)),
+        weights=np.ascontiguousarray(variables.weights),
+        state=np.zeros(6, dtype=np.int64),
+        after=np.concatenate([[np.inf, 0.0], np.zeros(len(variables.states))]),
+        signs=np.zeros((2, indicators)),
     )
 
 
 def _address(component: Any) -> int:
     return int(getattr(component, "value", component))
+
+
+def _start(references: References) -> np.uint64:
+    """Where an array begins; the variables keep it."""
+    return np.uint64(references.ctypes.data)
 
 
 def _function(library: Any, name: str | None, types: tuple[Any, ...]) -> Any:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,11 +19,12 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.errors import InputError
 from pneumo_ros.own_rig.description import Description
-from pneumo_ros.own_rig.fmu.archive import unpack
-from pneumo_ros.own_rig.fmu.handle import EVENTS, FAILED, Handle, handle_of
+from pneumo_ros.own_rig.fmu.archive import DESCRIPTION, unpack
+from pneumo_ros.own_rig.fmu.handle import EVENTS, FAILED, NEXT, STATES, Handle, handle_of
 from pneumo_ros.own_rig.fmu.variables import Variables, matched
 
 ROUNDS = 100  # of settling after a change
+VERSION = re.compile(rb"""fmiVersion\s*=\s*["']([^"']*)""")
 MESSAGE = 80  # characters of what an FMU says that an error repeats
 
 
@@ -71,7 +74,7 @@ class Instance:
         u : inputs of the first row, without the time
         """
         handle = self.handle
-        handle.state[:], handle.following[0] = 0, np.inf
+        handle.state[:], handle.after[NEXT] = 0, np.inf
         handle.values[:] = 0.0
         handle.values[: len(u)] = u
         try:
@@ -98,15 +101,12 @@ class Instance:
     def _exchanged(self, x: Array) -> None:
         """From the events of the initialisation to continuous time, at the states of the first row."""
         self._settled()
-        if len(self.handle.before) or not self._quiet():
+        if self.needs_completed or self.handle.signs.size or self.handle.after[NEXT] < np.inf:
             self.fmu.setTime(0.0)
             self._states(self.fmu.setContinuousStates, x)
             self.fmu.enterEventMode()
             self._settled()
             self.handle.state[EVENTS] = 1
-
-    def _quiet(self) -> bool:
-        return bool(self.handle.following[0] == np.inf and not self.needs_completed)
 
     def event(self) -> int:
         """Settle after a change: 0 if the instance did."""
@@ -126,16 +126,16 @@ class Instance:
                 raise RuntimeError("the FMU ends the run")
             if not more:
                 break
-        self.handle.following[0] = when if planned else np.inf
+        self.handle.after[NEXT] = when if planned else np.inf
         self.fmu.enterContinuousTimeMode()
-        if len(self.handle.settled):
-            self._states(self.fmu.getContinuousStates, self.handle.settled)
-        if len(self.handle.before):
-            self._states(self.fmu.getEventIndicators, self.handle.before)
+        if len(self.handle.after) > STATES:
+            self._states(self.fmu.getContinuousStates, self.handle.after[STATES:])
+        if self.handle.signs.size:
+            self._states(self.fmu.getEventIndicators, self.handle.signs[0])
 
     def started(self) -> Array:
         """States as the FMU starts them, after :meth:`begin`."""
-        return self.handle.settled.copy()
+        return self.handle.after[STATES:].copy()
 
     def _states(self, call: Callable[..., object], values: Array) -> None:
         values = np.ascontiguousarray(values)
@@ -180,15 +180,15 @@ def load(path: Path, rig: Description) -> tuple[Instance, Any]:
 
 
 def _described(fmpy: Any, path: Path, folder: Path) -> Any:
+    version = VERSION.search((folder / DESCRIPTION).read_bytes())
+    if version is not None and version[1][:2] not in (b"2.", b"3."):
+        raise InputError("a version of FMI that is not supported", where=path, value=_text(version[1]),
+                         allowed="2.0, 3.0", remedy="export it as one of those")  # fmt: skip
     try:
-        model = fmpy.read_model_description(str(folder), validate=False)
+        return fmpy.read_model_description(str(folder), validate=False)
     except Exception as error:  # whatever a broken description makes fmpy and lxml raise
         raise InputError("modelDescription.xml cannot be read", where=path, value=_first(error),
                          remedy="export it again as FMI 2 or 3") from error  # fmt: skip
-    if not str(model.fmiVersion).startswith(("2.", "3.")):
-        raise InputError("a version of FMI that is not supported", where=path, value=model.fmiVersion,
-                         allowed="2.0, 3.0", remedy="export it as one of those")  # fmt: skip
-    return model
 
 
 def _first(error: BaseException) -> str:
@@ -212,6 +212,7 @@ def _loaded(path: Path, folder: Path, model: Any, exchange: bool, said: list[str
     if not has:
         raise InputError("the FMU has no binary for this platform", where=path, value=library().platform_tuple,
                          remedy="export it for this platform, or with its sources and build them")  # fmt: skip
+    here = Path.cwd()  # fmpy goes to the library, and stays there when it cannot load it
     try:
         fmu = kinds[version, exchange](**asked)
         fmu.instantiate(**_told(version, said))
@@ -219,6 +220,8 @@ def _loaded(path: Path, folder: Path, model: Any, exchange: bool, said: list[str
         told = said[-1] if said else _first(error)
         raise InputError("the FMU cannot be loaded", where=path, value=told[:MESSAGE],
                          remedy="export it for this platform") from error  # fmt: skip
+    finally:
+        os.chdir(here)
     return fmu
 
 

@@ -62,9 +62,8 @@ def load_fmu(path: Path, rig: Description) -> tuple[Physics, Description]:
 def _started(instance: Instance, rig: Description, nominal: Array) -> Description:
     """The description with the states that only the FMU names, exact where it starts them."""
     instance.begin(nominal, np.zeros(len(instance.variables.states)), np.zeros(len(rig.inputs)))
-    found = instance.handle.settled
     starts = {name: rig.states.get(name, Start(value=float(v))) for name, v in
-              zip(instance.variables.states, found, strict=True)}  # fmt: skip
+              zip(instance.variables.states, instance.started(), strict=True)}  # fmt: skip
     return replace(rig, states=starts)
 
 

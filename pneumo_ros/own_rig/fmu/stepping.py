@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.own_rig.bridge import compiled
+from pneumo_ros.own_rig.bridge import CHANNELS, compiled
 from pneumo_ros.own_rig.fmu.calls import get2 as get_values
 from pneumo_ros.own_rig.fmu.calls import set2 as set_values
 from pneumo_ros.own_rig.fmu.calls import step2 as step
@@ -40,8 +40,10 @@ def see(p: Any, c: Array) -> None:
 @compiled
 def move(p: Any, inputs: Array, time: float, h: float, f: Array) -> None:
     """One step with inputs and what acts held."""
-    p.values[: len(inputs)] = inputs
-    p.values[len(inputs) :] = f
+    for j in range(len(inputs)):
+        p.values[j] = inputs[j]
+    for k in range(len(f)):
+        p.values[len(inputs) + k] = f[k]
     if p.state[0] == 0 and (set_values(p, p.driven, p.values) > 1 or step(p, time, h) > 1):
         p.state[0] = 1
 
@@ -62,7 +64,7 @@ def run(
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Channels (N, C), coordinates (N, K, 3) and what acts (N, K); channels are NaN after a failure."""
     rows, slots = len(u), len(terms)
-    out, where, acted = np.full((rows, len(p.read)), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
+    out, where, acted = np.full((rows, CHANNELS), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
     c, z, f = np.zeros((slots, 3)), np.zeros((slots, MEMORIES)), np.zeros(slots)
     inputs, h = np.zeros(len(held)), period / substeps
     for i in range(rows):
