@@ -43,7 +43,7 @@ KEYS = {
 # Distribution -> the one that requires it, up to one with a key.
 BROUGHT = {"lz4": "mcap", "zstandard": "mcap", "mcap": "mcap-ros2-support", "markupsafe": "jinja2"}
 # Extras of setup.py, or message packages that a node uses where they are there: each says so when it is missing.
-OPTIONAL = {"bokeh", "tornado", "dask", "distributed", "pyarrow", "control_msgs"}
+OPTIONAL = {"bokeh", "tornado", "dask", "distributed", "pyarrow", "fmpy", "control_msgs"}
 
 
 @pytest.fixture(scope="module")
