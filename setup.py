@@ -47,7 +47,7 @@ setup(
     maintainer="no public maintainer yet",
     maintainer_email="nobody@pneumo-ros.invalid",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={f"{NAME}.diagnosis.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"]},
+    package_data={f"{NAME}.diagnosis.report": ["*.j2"], f"{NAME}.session.report": ["*.j2"], f"{NAME}.fleet": ["*.j2"]},
     python_requires=">=3.10,<3.14",
     install_requires=[
         "setuptools",

@@ -39,6 +39,7 @@ VERBS: dict[str, str] = {
     "demo": "See it work: hide an effect in the rig, drive it, diagnose the logs, open the answer.",
     "run": "Run a session: simulate or drive the rig in closed loop and log it.",
     "diagnose": "Explain the sim-to-real gap of logs: where it lies, which effect causes it, how far it shrinks.",
+    "diagnose-all": "Diagnose every log of a folder; one table of rigs by dates: which effect grows where.",
     "effects": "Show what the diagnosis can name: meaning, parameters, what looks alike, the check by hand.",
     "blind": "Make cases with a hidden effect, diagnose them, open the answers and score.",
     "replay": "Replay a log: live into ROS, stepped through today's code, or its road through the rig.",
@@ -73,7 +74,7 @@ class LazyGroup(TyperGroup):
             return None
         if self._listing:
             return TyperCommand(cmd_name, help=VERBS[cmd_name])
-        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{cmd_name}").app)
+        command = typer.main.get_command(import_module(f"pneumo_ros.cli.{cmd_name.replace('-', '_')}").app)
         command.name = cmd_name
         return command
 

@@ -61,3 +61,11 @@ def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1) 
     table = np.column_stack([t, 1e3 * x, [pull(one) for one in t]])
     np.savetxt(path, table, "%.6f", ",", header="t,x,force", comments="")
     return path
+
+
+def chamber_log(path: Path, seed: int, rate: float) -> Path:
+    """A chamber that loses ``rate`` of its pressure above ambient a second, 120 s at 10 Hz, 0.0015 bar of noise."""
+    t = np.arange(0.0, 120.0, 0.1)
+    gauge = 7.0 * np.exp(-rate * t) + np.random.default_rng(seed).normal(0.0, 0.0015, len(t))
+    np.savetxt(path, np.column_stack([1e3 * t, 0.5 * gauge, gauge]), "%.4f", ";")
+    return path

@@ -6,23 +6,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import ROOT
+from helpers.own_rigs import chamber_log
 from typer.testing import CliRunner
 
 from pneumo_ros.cli import diagnose
 from pneumo_ros.errors import InputError
 
 CHAMBER = ROOT / "examples" / "chamber" / "rig.py"
-
-
-def chamber_log(path: Path, seed: int, rate: float) -> Path:
-    """A chamber that loses ``rate`` of its pressure above ambient a second, 120 s at 10 Hz, 0.0015 bar of noise."""
-    t = np.arange(0.0, 120.0, 0.1)
-    gauge = 7.0 * np.exp(-rate * t) + np.random.default_rng(seed).normal(0.0, 0.0015, len(t))
-    np.savetxt(path, np.column_stack([1e3 * t, 0.5 * gauge, gauge]), "%.4f", ";")
-    return path
 
 
 def diagnosed(folder: Path, after: Path, before: Path) -> dict[str, object]:
