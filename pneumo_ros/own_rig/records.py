@@ -14,6 +14,7 @@ from pneumo_ros.diagnosis.fit.pace import Pace, pace_of_signals
 from pneumo_ros.diagnosis.signals.noise import white_noise
 from pneumo_ros.diagnosis.signals.types import Limitation, TopicTiming
 from pneumo_ros.errors import InputError
+from pneumo_ros.own_rig.clocks import on_one_clock
 from pneumo_ros.own_rig.description import Description, SignalSpec
 from pneumo_ros.own_rig.tables import Sampled, sampled
 
@@ -97,7 +98,8 @@ def read_record(path: Path, rig: Description) -> OwnRecord:
     InputError
         saying in one line what cannot be used.
     """
-    held = {spec.name: _clean(sampled(path, spec, rig), path, spec) for spec in _logged(rig)}
+    clean = {spec.name: _clean(sampled(path, spec, rig), path, spec) for spec in _logged(rig)}
+    held, limitations = on_one_clock(clean, {spec.name: spec.topic for spec in _logged(rig)}, path)
     for spec in (*rig.channels.values(), *rig.inputs.values()):
         if spec.rate_of:
             held[spec.name] = _rate(held[_source(spec, held, rig)])
@@ -112,7 +114,7 @@ def read_record(path: Path, rig: Description) -> OwnRecord:
     whole = np.column_stack(inputs) if inputs else np.zeros((len(base), 0))
     return OwnRecord(path.name if path.is_dir() else path.stem, rig.name, tuple(rig.channels), period, measured, weight,
                      whole, noise, slow, 0.0, pace_of_signals(measured, period, noise), rig.model_form,
-                     tuple(_timing(name, held[name], base[0]) for name in rig.channels))  # fmt: skip
+                     tuple(_timing(name, held[name], base[0]) for name in rig.channels), limitations)  # fmt: skip
 
 
 def _logged(rig: Description) -> list[SignalSpec]:
@@ -133,10 +135,11 @@ def _clean(one: Sampled, path: Path, spec: SignalSpec) -> Sampled:
         raise InputError("too few samples", where=path, key=spec.name, value=int(np.count_nonzero(kept)),
                          allowed=f"at least {FEWEST}", remedy="record longer")  # fmt: skip
     time, values = one.time[kept], one.values[kept]
+    received = None if one.received is None else one.received[kept]
     later = np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0.0])
     if np.count_nonzero(~later) > MISSING * len(time):
         raise InputError("the time does not increase", where=path, key=spec.name, remedy="check the time's field")
-    return Sampled(time[later], values[later])
+    return Sampled(time[later], values[later], None if received is None else received[later])
 
 
 def _base(path: Path, rig: Description, held: dict[str, Sampled]) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +23,11 @@ SECOND = 1e-9
 
 @dataclass(frozen=True)
 class Sampled:
-    """A signal as it was logged: times (M,) s, values (M,), in the log's unit."""
+    """A signal as it was logged: times (M,) s, values (M,), in the log's unit, and when a recorder received them."""
 
     time: Array
     values: Array
+    received: Array | None = None
 
 
 def is_table(path: Path) -> bool:
@@ -47,7 +48,7 @@ def sampled(path: Path, spec: SignalSpec, rig: Description) -> Sampled:
     if len(found.time) != len(found.values):
         raise InputError("times and values of another number", where=file, key=spec.field,
                          value=(len(found.time), len(found.values)))  # fmt: skip
-    return Sampled(found.time, found.values * spec.scale + spec.shift)
+    return replace(found, values=found.values * spec.scale + spec.shift)
 
 
 def _beside(path: Path, spec: SignalSpec) -> Path:
@@ -186,7 +187,8 @@ def _of_bag(path: Path, spec: SignalSpec) -> Sampled:
         raise not_one_of("the log has no such topic", spec.topic, log.topics, where=path, key=spec.name)
     columns = log.columns(spec.topic)
     values = _field(columns.arrays, columns.texts, spec.field, path, spec.name)
-    return Sampled(np.asarray(columns.stamp_ns * SECOND, dtype=float), values)
+    stamps, received = (np.asarray(one * SECOND, dtype=float) for one in (columns.stamp_ns, columns.log_time_ns))
+    return Sampled(stamps, values, received)
 
 
 def _field(arrays: Mapping[str, Any], texts: Mapping[str, Any], field: str, path: Path, key: str) -> Array:
