@@ -140,8 +140,8 @@ def _said(topic: str, first: str, one: Apart, move: tuple[float, float]) -> str:
         if abs(late) <= SAME:
             return ""
         when = "later" if late > 0.0 else "earlier"
-        return (f"{topic} arrives {abs(late):.2g} s {when} after its stamps than {first}: taken for a delay on its way, "
-                "its stamps for true")  # fmt: skip
+        return (f"{topic} arrives {abs(late):.2g} s {when} after its stamps than {first}: taken for a delay on its "
+                "way, its stamps for true")  # fmt: skip
     parts = [f"is {abs(move[0]):.3g} s {'behind' if move[0] > 0.0 else 'ahead'}"] if abs(move[0]) > SAME else []
     if move[1] != 0.0:
         parts.append(f"runs {1e6 * abs(move[1]):.3g} ppm {'slow' if move[1] > 0.0 else 'fast'}")
