@@ -46,7 +46,7 @@ inputs:
   pressure: {{{pressure}}}
 states: {{axle: axle, speed: rate of axle}}
 parameters: {{mass: 4.54 +- 0.05 kg, tyre: 14000 +- 600 N/m, area: 1.1e-3 +- 0.1e-3 m2, damping: 50 +- 8 N s/m}}
-families: {{strut: [coulomb_friction, damping], 'sensor:axle': [lag]}}
+families: {{strut: [coulomb_friction, viscous_damping], 'sensor:axle': [lag]}}
 """
 OWN = {
     "axle": "topic: /rig/displacement, field: 'position[unsprung_front]'",
