@@ -35,11 +35,11 @@ def hidden_rig(nominal: Rig, library: Mapping[str, Effect], seed: int) -> Rig:
     rng = np.random.default_rng(seed)
     effect = library[str(rng.choice(sorted(set(library) - set(SELDOM_SHOWN))))]
     site = str(rng.choice(effect.sites))
-    values = tuple((p.name, _drawn(p, rng)) for p in effect.parameters)
-    return replace(_inside_tolerances(nominal, rng), effects=(NamedEffect(effect.id, site, values),))
+    values = tuple((p.name, drawn(p, rng)) for p in effect.parameters)
+    return replace(inside_tolerances(nominal, rng), effects=(NamedEffect(effect.id, site, values),))
 
 
-def _drawn(parameter: EffectParameter, rng: np.random.Generator) -> float:
+def drawn(parameter: EffectParameter, rng: np.random.Generator) -> float:
     """Near the typical value, of either sign where the bounds allow both; to three digits, as people write it."""
     factor = float(rng.uniform(*(SIZES if parameter.size else SHAPES)))
     if parameter.size and parameter.low <= -SIZES[1] * parameter.typical:
@@ -48,7 +48,8 @@ def _drawn(parameter: EffectParameter, rng: np.random.Generator) -> float:
     return float(f"{value:.3g}")
 
 
-def _inside_tolerances(nominal: Rig, rng: np.random.Generator) -> Rig:
+def inside_tolerances(nominal: Rig, rng: np.random.Generator) -> Rig:
+    """The rig with its own numbers drawn inside their tolerances, as no rig is its data sheet."""
     values = {}
     for name in LIMITS:
         quantity = getattr(nominal, name)
