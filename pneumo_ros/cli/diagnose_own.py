@@ -42,6 +42,7 @@ def diagnose_own(
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.diagnosis.report import Asked, claim_folder
     from pneumo_ros.own_rig import outputs
+    from pneumo_ros.own_rig.experiment import design_own
     from pneumo_ros.own_rig.from_files import prepared
 
     claim_folder(output)
@@ -54,11 +55,13 @@ def diagnose_own(
     threads = (os.cpu_count() or 1) if kernel.compiled and not kernel.alone else 1
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
-        options = Options(pairs=pairs, threads=threads)
+        options = Options(pairs=pairs, threads=threads, experiment=design_own)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
     named = ("--rig-model", str(model), *(() if rig_asked is None else ("--rig", str(rig_asked))))
     asked = Asked(tuple(fit), holdout, output, save_rig, named)
     files, first = outputs.write_outputs(output, found, task.model, task.fit, task.holdout, asked)
+    if found.experiment is not None:
+        files += found.experiment.write(output)
     if save_rig is not None:
         files.append(outputs.save_rig(found, task.model, save_rig))
     show(console, found, first)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
@@ -23,7 +24,7 @@ from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
+from pneumo_ros.diagnosis.result import Diagnosis, Gap
 from pneumo_ros.diagnosis.search.competition import Effort, Progress, Search, compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
@@ -60,7 +61,7 @@ class Options:
     limits: Thresholds = field(default_factory=null_thresholds)
     calibration: Calibration = field(default_factory=Calibration)
     locate: Locate | None = None
-    experiment: Callable[[Problem, Fit, Fit], Experiment | None] | None = None
+    experiment: Callable[[Problem, Fit, Fit], NextExperiment | None] | None = None
     threads: int = 1
 
 
@@ -285,8 +286,11 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
 
 
 def _next_experiment(
-    outcome: Outcome, opinion: Opinion, group: Sequence[str], design: Callable[[Problem, Fit, Fit], Experiment | None]
-) -> Experiment | None:
+    outcome: Outcome,
+    opinion: Opinion,
+    group: Sequence[str],
+    design: Callable[[Problem, Fit, Fit], NextExperiment | None],
+) -> NextExperiment | None:
     """Split the verdict from its strongest rival."""
     names = [(name_of(s.fit.candidate), s) for s in outcome.finalists]
     rivals = [s for name, s in names if name in group and name != opinion.verdict]

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.experiment import SEPARATES, NextExperiment, refusal
 from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
-SEPARATES = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart
 ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
 
 
@@ -195,9 +195,7 @@ class Experiment:
     @property
     def refusal(self) -> str:
         """Why it is not offered, for people."""
-        return (f"no experiment is offered: of {self.chosen_from} road and valve profiles the best, {self.name}, would "
-                f"drive the rivals {self.separation:.2g} standard deviations of the noise apart, and {SEPARATES:g} are "
-                "needed; the check by hand tells them apart")  # fmt: skip
+        return refusal("road and valve profiles", self.chosen_from, self.name, self.separation)
 
     def write(self, folder: Path) -> list[Path]:
         """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""
@@ -290,7 +288,7 @@ class Diagnosis:
     remainder: Remainder | None = None
     floor_share: float = 0.0
     not_testable: Mapping[str, str] = field(default_factory=dict)
-    experiment: Experiment | None = None
+    experiment: NextExperiment | None = None
     edit: EditTest | None = None
     notes: tuple[str, ...] = ()
     logs: Mapping[str, Any] = field(default_factory=dict)

@@ -19,7 +19,7 @@ from pneumo_ros.own_rig.quantities import Written, conversion, quantity
 KEYS = ("rig", "time", "start", "end", "channels", "inputs", "states", "parameters", "model_form", "families",
         "effects", "scales", "fmu")  # fmt: skip
 MODEL_FORM = 0.05  # a model on one page is seldom truer than this; state what yours is worth
-SIGNAL_KEYS = ("field", "topic", "unit", "sign", "noise", "hold", "beside", "rate_of", "default")
+SIGNAL_KEYS = ("field", "topic", "unit", "sign", "noise", "hold", "beside", "rate_of", "default", "drive")
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class SignalSpec:
     hold : an input that is held from row to row
     beside : (ending, other ending): the file that holds it has the log's name with another ending
     rate_of : the signal whose rate of change it is; ""
+    drive : an input that its owner can command, so that an experiment may be proposed with it
     """
 
     name: str
@@ -48,6 +49,7 @@ class SignalSpec:
     hold: bool = False
     beside: tuple[str, str] | None = None
     rate_of: str = ""
+    drive: bool = False
 
 
 @dataclass(frozen=True)
@@ -193,7 +195,8 @@ def _signal(name: str, entry: Any, path: Path, key: str) -> SignalSpec:
                          allowed="[_x.mat, _y.mat]")  # fmt: skip
     pair = None if beside is None else (str(beside[0]), str(beside[1]))
     where = str(entry.get("field", name)), str(entry.get("topic", ""))
-    return SignalSpec(name, *where, unit, factor * sign, offset * sign, noise, bool(entry.get("hold")), pair, rate_of)
+    flags = bool(entry.get("hold")), bool(entry.get("drive"))
+    return SignalSpec(name, *where, unit, factor * sign, offset * sign, noise, flags[0], pair, rate_of, flags[1])
 
 
 def _noise(entry: Any, factor: float, path: Path, key: str) -> float:

@@ -10,10 +10,13 @@ import pytest
 from conftest import ROOT
 from helpers.fmus import FRAME_YAML, built, frame_log, with_names
 
+from pneumo_ros.diagnosis.diagnose import Options
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.own_rig.description import read_description
 from pneumo_ros.own_rig.fmu.model import load_fmu
+from pneumo_ros.own_rig.fmu.names import fmu_names
 from pneumo_ros.own_rig.from_files import OwnTask, prepared
+from pneumo_ros.own_rig.outputs import save_rig
 
 RUBBED = (Active("coulomb_friction", "floor_to_ground", (1.3,)),)
 CASES = [(2, "ModelExchange"), (2, "CoSimulation"), (3, "ModelExchange"), (3, "CoSimulation")]
@@ -101,3 +104,27 @@ def test_the_verdict_and_the_budget_are_the_rig_files(log: Path, own: OwnTask, t
         assert found.verdict == wanted.verdict and found.location[0][0] == "floor_to_ground"
         assert [(one.effects, one.places) for one in found.budget] == [(o.effects, o.places) for o in wanted.budget]
         assert [one.share for one in found.budget] == pytest.approx([one.share for one in wanted.budget], abs=0.03)
+
+
+@pytest.mark.slow
+def test_a_saved_rig_of_an_fmu_is_a_model_of_it(log: Path, tmp_path: Path) -> None:
+    fmu = with_names(built(tmp_path / "frame.fmu", 2, ("CoSimulation",)))
+    task = prepared(fmu, [log])
+    saved = save_rig(task.diagnose(Options(pairs=False)), task.model, tmp_path / "saved.yaml")
+    again = prepared(fmu, [log], rig=saved)
+    assert [(one.effect, one.site) for one in again.model.standing][0] == ("coulomb_friction", "floor_to_ground")
+    assert again.diagnose(Options(pairs=False)).verdict == "none"
+
+
+def test_slots_are_read_by_kind(tmp_path: Path) -> None:
+    entry = {"slots": {
+        "valve": {"flow": "q", "up": "tank.p", "down": "air.p", "nominal": "m_dot", "gas": False, "unit": "m3/s"},
+        "teeth": {"contact": "t", "travel": "a.phi - b.phi", "rate": "a.w - b.w", "load": "tau", "unit": "N m"},
+        "speed": "sensor", "motor": "input",
+    }}  # fmt: skip
+    found = fmu_names(entry, tmp_path / "rig.yaml")
+    valve, teeth = found.inside
+    assert (valve.slot.kind, valve.variable, valve.slot.gas) == ("flow", "q", False)  # type: ignore[attr-defined]
+    assert valve.coordinates == ((("tank.p", 1.0),), (("air.p", 1.0),), (("m_dot", 1.0),))
+    assert teeth.slot.kind == "contact" and teeth.coordinates[0] == (("a.phi", 1.0), ("b.phi", -1.0))
+    assert [slot.place for slot in found.signals] == ["sensor:speed", "input:motor"]

@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The experiment that would split an ambiguity group: profiles ranked by how far they drive the rivals apart.
-
-Each rival keeps what its own fit of the log gave it, so that on the log they agree; on a candidate profile they are
-simulated, the nuisance parameters answer linearly (a difference that a tolerance could explain separates nothing), and
-what remains is compared with the sensors' noise.
-"""
+"""The experiment that would split an ambiguity group: profiles ranked by how far they drive the rivals apart."""
 
 from __future__ import annotations
 
@@ -15,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import Problem, average
+from pneumo_ros.diagnosis.experiment import separation as separation_of
+from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.result import Experiment
 from pneumo_ros.effects.rig_model import RigModel
@@ -23,7 +19,6 @@ from pneumo_ros.plant.trim import Trim, trim
 
 DURATION = 12.0  # s
 PERIOD = 2e-3  # s
-STEP = 0.5  # prior sigmas, for the nuisance parameters' answer
 
 
 @dataclass(frozen=True)
@@ -154,11 +149,11 @@ def design_experiment(problem: Problem, best: Fit, rival: Fit) -> Experiment | N
     if not isinstance(model, RigModel):
         return None
     at_rest = trim(model.rig)
-    now = _separation(problem, best, rival, problem.records[-1])
+    now = separation_of(problem, best, rival, problem.records[-1])
     found = []
     for profile in PROFILES:
         record = _record(model, profile, at_rest, problem.records[-1])
-        found.append((_separation(problem, best, rival, record), profile, record))
+        found.append((separation_of(problem, best, rival, record), profile, record))
     separation, profile, record = max(found, key=lambda item: item[0])
     time = np.arange(len(record.measured)) * record.period
     return Experiment(
@@ -182,28 +177,3 @@ def _record(model: RigModel, profile: Profile, at_rest: Trim, like: Any) -> Any:
 def replace_state(like: Any, state: Array) -> Any:
     """The record's initial estimate, put at rest."""
     return like.start_state._replace(state=np.asarray(state))
-
-
-def _separation(problem: Problem, best: Fit, rival: Fit, record: Any) -> float:
-    """Root mean square of the rivals' difference over the noise, free of what nuisance parameters could answer."""
-    model = problem.model
-    active = problem.active(best.candidate, problem.values(best.candidate, best.x))
-    other = problem.active(rival.candidate, problem.values(rival.candidate, rival.x))
-    nuisance = problem.nuisance(best.x)
-
-    def outputs(values: Array, effects: Any) -> Array:
-        initial = model.initial(record, effects)[0]
-        return np.asarray(average(model.predict(record, values, initial, effects), problem.averaged) / record.noise)
-
-    base = outputs(nuisance, active)
-    difference = (outputs(problem.nuisance(rival.x), other) - base).ravel()
-    columns = []
-    for m, p in enumerate(model.parameters):
-        moved = nuisance.copy()
-        moved[m] += STEP * p.std
-        columns.append((outputs(moved, active) - base).ravel() / STEP)
-    J = np.array(columns).T
-    if not (np.all(np.isfinite(J)) and np.all(np.isfinite(difference))):
-        return 0.0
-    answer = np.linalg.solve(J.T @ J + np.eye(J.shape[1]), J.T @ difference)
-    return float(np.sqrt(np.mean((difference - J @ answer) ** 2)))

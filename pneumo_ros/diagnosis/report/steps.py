@@ -90,10 +90,17 @@ def _own_steps(summary: Mapping[str, Any], asked: Asked) -> list[Step]:
     text = "Keep the model, with its parameters as re-estimated." if verdict == "none" else (
         f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
     options = () if asked.rig is not None else ("--overwrite", "--save-rig", str(rig))
+    split = [_own_experiment(summary["next_experiment"], asked)] if summary.get("next_experiment") else []
     if asked.rig is not None:
-        return [Step(f"{text} {rig} has it, for --rig of the next diagnosis.")]
-    return [Step(f"{text} A rig file has it, for --rig of the next diagnosis:",
+        return [*split, Step(f"{text} {rig} has it, for --rig of the next diagnosis.")]
+    return [*split, Step(f"{text} A rig file has it, for --rig of the next diagnosis:",
                  (asked.diagnosis(output=asked.output, options=options),))]  # fmt: skip
+
+
+def _own_experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
+    file = shlex.quote(str(asked.output / str(experiment["file"])))
+    aim = f"Split the rivals: {str(experiment['description']).rstrip('.')}. {file} holds it"
+    return Step(f"{aim}; it stays inside what the log had of range and rate. Log that, and fit both logs.")
 
 
 def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:

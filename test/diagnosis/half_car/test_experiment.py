@@ -10,10 +10,11 @@ import pytest
 from helpers.own_logs import QUICK, drawn, log
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.experiment import SEPARATES
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, design_experiment
-from pneumo_ros.diagnosis.result import SEPARATES, Experiment
+from pneumo_ros.diagnosis.result import Experiment
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.rig import load_rig
