@@ -6,6 +6,19 @@ their rates, front and rear spring pressure [Pa absolute]. All z are upwards fro
 nose up.
 Inputs: commanded orifice areas (front inlet, rear inlet, front outlet, rear outlet) [m2], held over a period, and road
 height (front, rear) [m], linear over a period.
+
+Kernel arguments
+----------------
+x, x0, state : (10,): heave, pitch, two axle heights, their rates, two absolute pressures; m, rad, m/s, rad/s, Pa
+a, b, c, d, k : rates of the state
+dt, period, steps : a step, s; a control period, s, and the RK4 steps in it
+height, height_rate : of a spring, m and m/s, extension positive
+pressure, ambient : absolute, Pa
+scale, damping : factor on the effective area, 1; of the bushing, N s/m
+inlet_front, inlet_rear, outlet_front, outlet_rear : openings, m2; command, commands : the four, (4,), (N, 4)
+road_front, road_rear : heights of the ground, m; road : both at the ends of each period
+p, packed, start : numbers of :attr:`HalfCar.packed`, and where a spring's begin
+heights, pressures, cubics : fields of :class:`~pneumo_ros.plant.air_spring.AreaSurface`
 """
 
 from __future__ import annotations

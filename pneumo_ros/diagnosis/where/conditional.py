@@ -4,6 +4,16 @@
 A subsystem whose own run stays close although the whole drifts off is sound; one that leaves the log while everything
 around it is measured holds (part of) the fault. Rates of the fed states are smoothed derivatives: they only feed
 damping and volume change of the simulated subsystem.
+
+Kernel arguments
+----------------
+x, k, dt : state, its rate, and a step, s
+fed, following : measured states (N, 10), or two consecutive rows of them
+part : how far between these two rows, 0..1
+own : (10,) states that are simulated; the others are taken from ``fed``
+start : (10,) first state
+commands, road : (N, 4) openings, m2; (N, 2) heights of the ground, m
+period : s
 """
 
 from __future__ import annotations

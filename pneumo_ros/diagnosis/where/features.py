@@ -2,6 +2,10 @@
 """Local motion and flow at every instant of a log, smoothed: what a correction may depend on.
 
 Velocities and accelerations here only shape corrections; no equation is tested with them.
+
+Kernel arguments
+----------------
+pressure : (N,) absolute, Pa
 """
 
 from __future__ import annotations

@@ -11,6 +11,12 @@ equation's own unit:
 
 The air balance is used in conservative form, d(m)/dt = W12 - W23 with m = P V / (R T2) (Eqs. 4.13, 4.17, 4.20): it is
 Eq. 4.22 before the chain rule, and holds no derivative but that of the mass.
+
+Kernel arguments
+----------------
+height, pressure : (N,) of a spring, m, and absolute, Pa
+inlet, outlet : (N,) commanded openings, m2
+scale, ambient : factor on the effective area, 1, and absolute pressure, Pa
 """
 
 from __future__ import annotations

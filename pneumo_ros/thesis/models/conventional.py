@@ -3,6 +3,14 @@
 
 State (8): heave, pitch, unsprung front and rear [m, rad, m, m], then their rates, all measured from static equilibrium:
 the weight then drops out. Pitch is positive nose up. The printed Eqs. 3.3-3.4 mix both signs of pitch; these do not.
+
+Kernel arguments
+----------------
+body_rate, axle_rate : upwards, m/s
+damping, damping_max, skyhook : of a damper, the most it can give, and of the sky's, N s/m
+x, x0, k, h : state (8,): heave, pitch, axles, m and rad, then their rates; its rate; a step, s
+road, road_front, road_rear : heights of the ground, m
+period, steps : s, and RK4 steps in it
 """
 
 from __future__ import annotations

@@ -4,6 +4,14 @@
 State (5): sprung and unsprung height [m], their rates, spring pressure [Pa absolute]. All z
 upwards from the ground datum.
 Inputs: inlet and outlet opening [m2], held over a period, and road height [m], linear over a period.
+
+Kernel arguments
+----------------
+x, x0 : state (5,): sprung and unsprung height, m, their rates, m/s, absolute pressure, Pa
+a, b, c, d, k : rates of the state
+dt, period, steps : a step, s; a control period, s, and the RK4 steps in it
+inlet, outlet : openings, m2; commands : both, (N, 2)
+road : height of the ground, m, at one instant or at the ends of each period
 """
 
 from __future__ import annotations
