@@ -40,7 +40,7 @@ def covariance(problem: Problem, fit: Fit) -> Array:
 
 
 def correlation_time(residual: Array) -> float:
-    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero, worst half of the channels."""
+    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero; median of the channels."""
     times = []
     for column in (residual - residual.mean(axis=0)).T:
         power = float(column @ column)

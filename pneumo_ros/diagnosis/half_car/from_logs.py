@@ -95,7 +95,7 @@ def prepared(
 
 
 def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:
-    """Refuse inputs that throw the nominal model off the road: no fit starts from there."""
+    """Refuse inputs on which the nominal model diverges from the start: no fit can start from there."""
     for log in logs:
         if not np.all(np.isfinite(model.simulate(log))):
             raise InputError(

@@ -2,7 +2,7 @@
 """The linear problem behind "where": weak residuals of a log, and what each parameter and correction does to them.
 
 Every column is in the unit of its equation; :func:`design_of` divides by what noise and model form explain, so that a
-residual of one is nothing to talk about.
+residual of one (dimensionless) is what a rig without a fault leaves.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def _noisy(measured: Array, noise: Array, rng: np.random.Generator) -> Array:
 
 
 def model_form(car: HalfCar, features: Features) -> Array:
-    """(6,) what an honest model's laws leave in each equation, in its unit."""
+    """(6,) residual of each equation on a rig without a fault whose laws are not quite the model's, in its unit."""
     body = car.body
     weight = body.sprung_mass * GRAVITY
     arm = 0.5 * (body.front_arm + body.rear_arm)

@@ -27,7 +27,7 @@ class Closing(Protocol):
 
 
 def smallest(closing: Closing, places: Sequence[str], largest: int = LARGEST, least: float = 0.0) -> list[str]:
-    """The smallest set after which further places stop being worth their while.
+    """The smallest set to which no further place adds enough.
 
     A further place must close :data:`WORTH` of what is left, and ``least`` of what was there at first.
     """
