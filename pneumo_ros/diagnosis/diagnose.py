@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -32,11 +32,12 @@ from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
-LIKELY = 0.05  # share of a place from which a remainder is looked for there
-SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
-MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
-FEWEST = 16  # rows of a record
-SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
+LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
+SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]
+# Share of the library that the excitation cannot show, above which "none" would say nothing [taste]
+MOSTLY: Final = 0.5
+FEWEST: Final = 16  # rows of a record at least [numerics]
+SPLIT: Final = 0.65  # share of a lone log that is fitted; the rest is held out [taste]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +21,14 @@ from pneumo_ros.diagnosis.fit.pace import Pace, shared_pace
 from pneumo_ros.diagnosis.model import Model, parameters_at
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
-MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
-COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
-REACH = 3.0  # prior sigmas that a nuisance parameter may move
-INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
-SELECT_EVERY = 3  # one of so many blocks is kept from the fit and used for selection
+# Share of a channel's std below which a model of this kind is not asked to explain anything [taste]
+MODEL_FORM_FLOOR: Final = 2.5e-3
+COARSE_BELOW: Final = 2.5e-3  # s between rows; a slower log is not halved for its sensitivities [numerics]
+REACH: Final = 3.0  # prior sigmas that a nuisance parameter may move [taste]
+# Factor on the std of the measured initial state: its samples were low-passed, which white noise does not know
+# [taste]
+INITIAL_WIDENING: Final = 3.0
+SELECT_EVERY: Final = 3  # one of so many blocks is kept from the fit and used for selection [taste]
 
 Part = tuple[str, str]  # effect id, site
 Item = TypeVar("Item")

@@ -14,6 +14,7 @@ carries them on by a secant; after one that does not they are taken anew.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -21,14 +22,19 @@ from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 
-HUBER = 4.0  # robust sigmas
-STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
-CENTRAL = 2e-3  # half width of the central differences
-TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
-NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
-KEPT = 0.3  # share of the predicted gain from which sensitivities are carried on by a secant rather than taken anew
-COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
-START_DAMPING, MOST_DAMPING = 1e-4, 1e6
+HUBER: Final = 4.0  # robust sigmas from which a residual counts linearly instead of squared [taste]
+# Forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate [numerics]
+STEP: Final = 2e-3
+CENTRAL: Final = 2e-3  # half width of the central differences, scaled units [numerics]
+TOLERANCE: Final = 0.05  # of the cost; a diagnosis compares costs that differ by whole units [numerics]
+# Scaled units: sensitivities are borrowed for the next step only after a step shorter than this [numerics]
+NEAR: Final = 0.3
+# Share of the predicted gain from which sensitivities are carried on by a secant rather than taken anew [numerics]
+KEPT: Final = 0.3
+COST_FLOOR: Final = 0.05  # mean square, sigma squared: keeps the logarithm finite on noise-free data [numerics]
+# Levenberg-Marquardt damping of a fit's first step, as a share of the curvature's diagonal [numerics]
+START_DAMPING: Final = 1e-4
+MOST_DAMPING: Final = 1e6  # largest damping; a step is nothing there [numerics]
 
 
 @dataclass(frozen=True)

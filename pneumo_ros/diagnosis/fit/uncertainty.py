@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -14,10 +15,12 @@ from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
 from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
-LONGEST = 60  # fit samples over which the residual's correlation is summed
-TRUE_TO = 2e-3
-LAW = 0.015  # of an effect's value: another law of the same kind puts its parameter that far off
-NOTHING = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by
+LONGEST: Final = 60  # fit samples over which the residual's correlation is summed [numerics]
+TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
+# Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
+# [taste]
+LAW: Final = 0.015
+NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by [numerics]
 
 
 def covariance(problem: Problem, fit: Fit) -> Array:

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -26,8 +27,9 @@ from pneumo_ros.effects.loading import laws_of, own_ids
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 
-MAX_LAWS = 2
-FILES = ("diagnosis.json", "report.html", "residual.mcap")
+MAX_LAWS: Final = 2  # places whose missing law is drawn [display]
+# names of the files that a diagnosis leaves [definition]
+FILES: Final = ("diagnosis.json", "report.html", "residual.mcap")
 
 
 def claim_folder(folder: Path) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,9 @@ from pneumo_ros.log.topics import (
 )
 from pneumo_ros.log.writing import Channel, LogWriter
 
-PREFIXES = {"nominal": "/nominal", "refit": "/refit", "best": "/corrected"}
-CONFIG = "/rig/config"
+# run -> what its topics in residual.mcap begin with [definition]
+PREFIXES: Final = {"nominal": "/nominal", "refit": "/refit", "best": "/corrected"}
+CONFIG: Final = "/rig/config"  # topic of the contract [definition]
 
 
 def write_residual_log(path: Path, holdout: Signals, trajectories: Mapping[str, Array]) -> None:

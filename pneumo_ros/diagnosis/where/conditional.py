@@ -18,7 +18,7 @@ period : s
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -39,7 +39,8 @@ class Subsystem(NamedTuple):
     channels: tuple[int, ...]
 
 
-SUBSYSTEMS = {
+# Parts that can be run alone, with the states they own and the channels that judge them [definition]
+SUBSYSTEMS: Final = {
     "body": Subsystem((0, 1, 4, 5), (0, 1)),
     "front_axle": Subsystem((2, 6), (2,)),
     "rear_axle": Subsystem((3, 7), (3,)),

@@ -8,6 +8,7 @@ residual of one (dimensionless) is what a rig without a fault leaves.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -20,13 +21,15 @@ from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GRAVITY
 
-# Model form: what a rig whose only fault is its tolerances leaves of an equation, relative to the equation's own size.
-# On such rigs (other friction, gas and valve laws, none of them faulty) 0.05 % brings every equation to about one.
-MODEL_FORM = 5e-4
-NOISE_DRAWS = 4
-PARAMETER_STEP = 0.5  # standard deviations
-FIRST_SENSOR_STEP = 0.05  # of a sensor shape
-FEEDS = {
+# Model form: what a rig whose only fault is its tolerances leaves of an equation, relative to the equation's own
+# size. On such rigs (other friction, gas and valve laws, none of them faulty) 0.05 % brings every equation to about
+# one [calibration: rigs with other friction, gas and valve laws and no fault]
+MODEL_FORM: Final = 5e-4
+NOISE_DRAWS: Final = 4  # draws of sensor noise that its residuals are estimated from [numerics]
+PARAMETER_STEP: Final = 0.5  # prior sigmas, forward difference of a parameter [numerics]
+FIRST_SENSOR_STEP: Final = 0.05  # share of a sensor shape's unit, forward difference [numerics]
+# Channels that an equation reads [definition]
+FEEDS: Final = {
     "heave": MEASURED,
     "pitch": MEASURED,
     "front_axle": ("sprung_front", "unsprung_front", "front_pressure"),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import REACH
 
-REACH = 3.0  # standard deviations that a parameter may be off
-# Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough for
-# an effect a hundred times the null, narrow enough that near-copies of a shape do not cancel each other.
-LOOSENESS = 30.0
+# Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough
+# for an effect a hundred times the null, narrow enough that near-copies of a shape do not cancel each other
+# [numerics]
+LOOSENESS: Final = 30.0
 
 
 class Rows(NamedTuple):
