@@ -65,7 +65,7 @@ def test_generated_docs_are_up_to_date(name: str) -> None:
 
 
 def test_every_declared_parameter_says_what_it_is() -> None:
-    from pneumo_ros.cli.run import node_tables
+    from pneumo_ros.cli.session_plan import node_tables
 
     for node, table in node_tables().items():
         for p in table:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pneumo_ros.cli.constants_page import constants_page
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.cli.topics_page import topics_page
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
 from pneumo_ros.effects.loading import laws_of, load_library

@@ -20,7 +20,7 @@ import zstandard
 
 from helpers.hostile import RIG, rest_log
 from helpers.small_logs import text
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.dashboard.source import Playback
