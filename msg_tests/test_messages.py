@@ -12,7 +12,8 @@ from helpers import sessions
 
 from pneumo_ros.cli.reference import documents
 from pneumo_ros.log import topics
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.interfaces import message_class
 
 PLAUSIBLE = {  # unit -> largest magnitude a running rig can show

@@ -20,24 +20,12 @@ from mcap.records import Footer, Header
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.bags import PROFILE, Part, files_of
-from pneumo_ros.log.container import (
-    FOOTER_LENGTH,
-    FRAME,
-    MAGIC,
-    SMALL,
-    Block,
-    Contents,
-    DamageError,
-    Frame,
-    check_ratio,
-    check_sections,
-    chunk_block,
-    mapped,
-    parse,
-    take_record,
-)
-from pneumo_ros.log.reading import Log, assemble, read_log
+from pneumo_ros.log.container import FOOTER_LENGTH, FRAME, MAGIC, Block, Contents, DamageError, Frame, parse
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import assemble, read_log
 from pneumo_ros.log.records import Gathered, gather
+from pneumo_ros.log.sections import SMALL, check_ratio, check_sections, chunk_block, take_record
+from pneumo_ros.log.unpacking import mapped
 
 # A record starts with its opcode and a length; none here is 4 GiB long, so the upper half of the length is zero.
 _START = re.compile(rb"[\x01-\x0f].{4}\x00\x00\x00\x00", re.DOTALL)

@@ -28,8 +28,9 @@ from pneumo_ros.diagnosis.signals import read_signals
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.log.comparison import compare
 from pneumo_ros.log.conformance import check_conformance
+from pneumo_ros.log.decoded import STRING, Log
 from pneumo_ros.log.inspection import inspect_log
-from pneumo_ros.log.reading import STRING, Log, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.repair import recover
 from pneumo_ros.log.tables import export
 from pneumo_ros.paths import share_file

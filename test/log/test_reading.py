@@ -23,8 +23,9 @@ from helpers.small_logs import (
 from mcap.writer import CompressionType, IndexType
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.decoded import JOINT_STATE, STRING, Log
 from pneumo_ros.log.layouts import layout_of
-from pneumo_ros.log.reading import JOINT_STATE, STRING, Log, read_log
+from pneumo_ros.log.reading import read_log
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,9 @@ from pneumo_ros.cli.log import app
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import compare
 from pneumo_ros.log.conformance import breaks_contract, check_conformance
+from pneumo_ros.log.decoded import STRING
 from pneumo_ros.log.inspection import inspect_log
-from pneumo_ros.log.reading import STRING, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.repair import recover
 from pneumo_ros.log.tables import export
 from pneumo_ros.rig import load_rig
