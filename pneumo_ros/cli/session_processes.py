@@ -18,11 +18,7 @@ if TYPE_CHECKING:
 from pneumo_ros.cli.session_plan import session_nodes
 
 FAILED = 1
-
-
 INTERRUPTED = 130  # as a shell says of Ctrl-C
-
-
 MIN_SAMPLES = 10  # fewer make no figures
 
 

@@ -22,23 +22,11 @@ from pneumo_ros.log.topic_data import Columns, Joint, Scalar, TopicInfo
 from pneumo_ros.rig import Rig, parse_rig
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
-
-
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
-
-
 STRING = "std_msgs/msg/String"
-
-
 CONFIG_TOPIC = "/rig/config"
-
-
 STAMP = ("header.stamp.sec", "header.stamp.nanosec")
-
-
 SECOND = 1_000_000_000  # ns
-
-
 # What rosbags' generated readers raise for bytes that are not the type's.
 BROKEN = (SerdeError, LookupError, AssertionError, ValueError, TypeError, OverflowError, MemoryError, struct.error)
 

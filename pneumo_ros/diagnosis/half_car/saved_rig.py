@@ -20,8 +20,9 @@ import numpy as np
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.loading import origin_of
+from pneumo_ros.effects.nuisance import NUISANCE
 from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import NUISANCE, RigModel
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
