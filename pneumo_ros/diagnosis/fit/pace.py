@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.traits import HasPace
 
 FEWEST_BLOCKS: Final = 9  # blocks of a whole record at least: three folds of three [numerics]
 MOST_BLOCKS: Final = 48  # blocks of a whole record at most: shorter ones tell no more [taste]
@@ -53,10 +55,9 @@ class Pace:
 HALF_CAR: Final = Pace()  # lengths of the half car: body at about 2 Hz, wheel hop at 9 Hz, logs at 500 Hz [physics]
 
 
-def pace_of(record: Any) -> Pace:
+def pace_of(record: Record) -> Pace:
     """A record's own pace, or the half car's."""
-    found = getattr(record, "pace", None)
-    return found if isinstance(found, Pace) else HALF_CAR
+    return record.pace if isinstance(record, HasPace) else HALF_CAR
 
 
 def pace_of_signals(measured: Array, period: float, noise: Array | None = None) -> Pace:
@@ -99,6 +100,6 @@ def _band(column: Array, period: float, sigma: float) -> tuple[float, float]:
     return float(slow), float(frequency[min(int(np.searchsorted(share, FASTEST)), len(frequency) - 1)])
 
 
-def shared_pace(records: Sequence[Any]) -> Pace:
+def shared_pace(records: Sequence[Record]) -> Pace:
     """The pace that logs are fitted at: that of the longest."""
     return pace_of(max(records, key=lambda r: len(r.measured) * r.period))

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.pace import Pace, shared_pace
-from pneumo_ros.diagnosis.model import Model, parameters_at
+from pneumo_ros.diagnosis.model import Model, Record, parameters_at
+from pneumo_ros.diagnosis.traits import HasCoarse, HasModelForm, HasScale, HasSlowNoise
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
 # Share of a channel's std below which a model of this kind is not asked to explain anything [taste]
@@ -71,7 +72,7 @@ class Problem:
     """
 
     model: Model
-    records: tuple[Any, ...]
+    records: tuple[Record, ...]
     own_average: int | None = None
     fold: int = SELECT_EVERY - 1
     threads: int = 1
@@ -122,7 +123,7 @@ class Problem:
         """(n, C) standard deviation of the sensor noise after averaging; what of it wanders does not average out."""
         out = []
         for r, real in zip(self.records, self._real, strict=True):
-            noise, slow = np.asarray(r.noise), np.asarray(getattr(r, "slow_noise", 0.0))
+            noise, slow = np.asarray(r.noise), np.asarray(r.slow_noise if isinstance(r, HasSlowNoise) else 0.0)
             white = np.sqrt(np.maximum(noise**2 - slow**2, 0.0)) if np.any(slow) else noise
             fast = white / np.sqrt(np.maximum(real.sum(axis=1), 1.0))
             out.append(np.hypot(fast, slow) if np.any(slow) else fast)
@@ -131,7 +132,7 @@ class Problem:
     @cached_property
     def expected(self) -> Array:
         """(n, C) what noise and the model form that a rig's maker states leave; the noise where none is stated."""
-        stated = [getattr(r, "model_form", 0.0) * scale_of(r) for r in self.records]
+        stated = [stated_form(r) * scale_of(r) for r in self.records]
         rows = [np.tile(s, (len(n), 1)) for s, n in zip(stated, self._real, strict=True)]
         return np.hypot(self.noise, np.vstack(rows))
 
@@ -236,12 +237,12 @@ class Problem:
         return float(np.sqrt(np.mean(np.sum((residual * sigma / scale) ** 2, axis=0) / there)))
 
     @cached_property
-    def coarse_records(self) -> tuple[Any, ...] | None:
+    def coarse_records(self) -> tuple[Record, ...] | None:
         """The logs at half the rate, if the model knows how: good enough for sensitivities at half the cost."""
-        coarse = getattr(self.model, "coarse", None)
-        if coarse is None or any(r.period > COARSE_BELOW for r in self.records):
+        model = self.model
+        if not isinstance(model, HasCoarse) or any(r.period > COARSE_BELOW for r in self.records):
             return None
-        return tuple(coarse(r) for r in self.records)
+        return tuple(model.coarse(r) for r in self.records)
 
     def predict_coarse(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) as :meth:`predict`, from the coarse logs."""
@@ -268,9 +269,14 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, "simulation")
 
 
-def form_of(record: Any) -> float:
+def stated_form(record: Record) -> float:
+    """Share of a channel's std that the maker's model form is worth; 0 where nothing is stated."""
+    return float(record.model_form) if isinstance(record, HasModelForm) else 0.0
+
+
+def form_of(record: Record) -> float:
     """Share of a channel's std that the maker's model form is worth, with the floor of any model of this kind."""
-    return float(np.hypot(MODEL_FORM_FLOOR, getattr(record, "model_form", 0.0)))
+    return float(np.hypot(MODEL_FORM_FLOOR, stated_form(record)))
 
 
 def _between(rows: Array, count: int) -> Array:
@@ -293,9 +299,7 @@ def average(samples: Array, count: int) -> Array:
     return np.asarray(np.add.reduce(grouped(samples, count), axis=1) * (1.0 / count))
 
 
-def scale_of(record: Any) -> Array:
+def scale_of(record: Record) -> Array:
     """Std of the log's channels, what the gap is normalised by; a constant channel counts as its noise."""
-    own = getattr(record, "scale", None)
-    if own is not None:
-        return np.maximum(own, np.maximum(record.noise, 1e-12))
-    return np.maximum(np.std(record.measured, axis=0), np.maximum(record.noise, 1e-12))
+    own = record.scale if isinstance(record, HasScale) else np.std(record.measured, axis=0)
+    return np.maximum(own, np.maximum(record.noise, 1e-12))

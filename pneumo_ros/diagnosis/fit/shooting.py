@@ -50,7 +50,7 @@ def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, itera
     return fit(problem, candidate, begin, iterations=iterations)
 
 
-def _windows(record: Any, fold: int, block: float) -> list[Any]:
+def _windows(record: Record, fold: int, block: float) -> list[Any]:
     """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
     if not isinstance(record, Sliceable):
         return []

@@ -13,6 +13,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
+from pneumo_ros.diagnosis.traits import HasDerived
 from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
 LONGEST: Final = 60  # fit samples over which the residual's correlation is summed [numerics]
@@ -93,7 +94,8 @@ def _derived(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
         block = slice(first, first + len(parameters))
         values, own = fit.x[block] * scale, cov[block, block] * np.outer(scale, scale)
         first += len(parameters)
-        for one in getattr(problem.model.effects[effect], "derived", ()):
+        known = problem.model.effects[effect]
+        for one in known.derived if isinstance(known, HasDerived) else ():
             value = one.of(tuple(values))
             steps = 1e-6 * np.maximum(np.abs(values), 1e-6 * scale)
             slope = np.array([(one.of(tuple(values + s * e)) - value) / s for s, e in zip(steps, np.eye(len(steps)),
