@@ -16,8 +16,9 @@ from typing import Any, Final, Protocol, runtime_checkable
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
 
 # prior sigma of a lead, samples: a lead costs something, so that jumps nothing depends on stay where the log has them
 # [taste]

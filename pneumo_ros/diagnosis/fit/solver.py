@@ -9,6 +9,12 @@ down-weighted (Huber) at a threshold that follows the misfit.
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
 between candidates and are taken over from the refit for the first step. A step that gains about what they predicted
 carries them on by a secant; after one that does not they are taken anew.
+
+Why not ``scipy.optimize.least_squares``: this cost is no sum of squares, so that it has to be called in rounds with the
+weight of the data set anew, and it takes no sensitivities from elsewhere, neither borrowed nor carried on. On a session
+pair with an LVDT's scale error four rounds end at the same cost (-540.3) with 650 simulations in 1.6 s, this solver with
+86 in 0.2 s. On structures that are wrong (cost 2700) rounds with its Huber loss go on to a cost 2 % lower, with 1100 to
+1750 simulations.
 """
 
 from __future__ import annotations
@@ -19,6 +25,7 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.box import bounded_newton as bounded_newton
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 
@@ -245,21 +252,3 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     prior = problem.prior(state.candidate)
     H = strength * (A.T @ A) + np.diag(prior + 1e-9)
     return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
-
-
-def bounded_newton(H: Array, g: Array, low: Array, high: Array) -> Array:
-    """Minimiser of ``d H d / 2 + g d`` within bounds, by pinning what would leave them (a few rounds suffice)."""
-    move = np.zeros(len(g))
-    free = np.ones(len(g), dtype=bool)
-    for _ in range(8):
-        pinned = ~free
-        rhs = -(g[free] + H[np.ix_(free, pinned)] @ move[pinned])
-        move[free] = np.linalg.solve(H[np.ix_(free, free)], rhs)
-        out = free & ((move < low) | (move > high))
-        if not out.any():
-            break
-        move[out] = np.clip(move[out], low[out], high[out])
-        free &= ~out
-        if not free.any():
-            break
-    return np.clip(move, low, high)

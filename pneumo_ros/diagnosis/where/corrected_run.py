@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
 from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, total_gap
 from pneumo_ros.diagnosis.signals import Signals
@@ -17,7 +18,6 @@ from pneumo_ros.diagnosis.where.design import PARAMETER_STEP, Design, pressure_r
 from pneumo_ros.diagnosis.where.features import Features
 from pneumo_ros.diagnosis.where.flexible import Basis
 from pneumo_ros.diagnosis.where.locate import Location, Start, locate, spread
-from pneumo_ros.diagnosis.where.solve import box_minimum
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel

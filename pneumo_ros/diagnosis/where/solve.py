@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
 from pneumo_ros.diagnosis.fit.problem import REACH
 
 # Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough
@@ -143,30 +143,3 @@ def _bounded(gram: Array, cross: Array, offset: Array) -> Array:
     reduced = gram[:p, :p] - gram[:p, p:] @ eliminated[:, :p]
     z = box_minimum(np.ascontiguousarray(reduced), cross[:p] - gram[:p, p:] @ eliminated[:, p], low, high)
     return np.concatenate([z, eliminated[:, p] - eliminated[:, :p] @ z])
-
-
-@njit(cache=True)
-def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
-    """Minimum of x'Gx/2 - c'x inside a box, by coordinate descent until no coordinate moves by 1e-5.
-
-    Parameters
-    ----------
-    gram : (n, n) G, symmetric with a positive diagonal
-    cross : (n,) c
-    low, high : (n,) bounds of x
-    """
-    x = np.minimum(np.maximum(np.zeros(len(cross)), low), high)
-    gradient = gram @ x - cross
-    for _ in range(3000):
-        moved = 0.0
-        for i in range(len(cross)):
-            new = min(max(x[i] - gradient[i] / gram[i, i], low[i]), high[i])
-            step = new - x[i]
-            if step != 0.0:
-                x[i] = new
-                for j in range(len(cross)):
-                    gradient[j] += gram[j, i] * step
-                moved = max(moved, abs(step))
-        if moved < 1e-5:
-            break
-    return x

@@ -19,10 +19,10 @@ from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
 from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.where.design import Design, car_of, inlet_gain, inputs_of
-from pneumo_ros.diagnosis.where.solve import box_minimum
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, averaged, weak_residuals
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar

@@ -13,6 +13,7 @@ import pytest
 from helpers.rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
+from pneumo_ros.diagnosis.fit.box import box_minimum
 from pneumo_ros.diagnosis.signals import MEASURED, Signals, TopicData, prepare, read_signals
 from pneumo_ros.diagnosis.where import (
     Start,
@@ -28,7 +29,7 @@ from pneumo_ros.diagnosis.where.locate import corrected_residual
 from pneumo_ros.diagnosis.where.path_share import explained
 from pneumo_ros.diagnosis.where.regimes import bands, harmonics, regimes
 from pneumo_ros.diagnosis.where.sets import best_subset, rivals, shapley, smallest
-from pneumo_ros.diagnosis.where.solve import Rows, box_minimum, forms_of
+from pneumo_ros.diagnosis.where.solve import Rows, forms_of
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.parameters import Active
