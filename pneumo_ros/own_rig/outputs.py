@@ -15,16 +15,13 @@ from pneumo_ros.diagnosis.report.card import RigCard
 from pneumo_ros.diagnosis.report.contents import Findings
 from pneumo_ros.diagnosis.report.outputs import write_files
 from pneumo_ros.diagnosis.report.quantities import readable
-from pneumo_ros.diagnosis.report.residual_log import PREFIXES
+from pneumo_ros.diagnosis.report.residual_log import PREFIXES, new_residual_log, tables_of, write_joints
 from pneumo_ros.diagnosis.report.steps import Asked
 from pneumo_ros.diagnosis.report.story import Story
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import is_law
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
-from pneumo_ros.log.cdr import JointEncoder
-from pneumo_ros.log.topics import JOINT
-from pneumo_ros.log.writing import LogWriter
 from pneumo_ros.own_rig.model import OwnRig
 from pneumo_ros.own_rig.picture import picture_of
 from pneumo_ros.own_rig.quantities import UNITS
@@ -72,22 +69,10 @@ def card_of(model: OwnRig, record: OwnRecord) -> RigCard:
 
 def write_residuals(path: Path, model: OwnRig, holdout: OwnRecord, runs: Mapping[str, Array]) -> None:
     """The held-out log beside the free runs, each a JointState by channel: ``/measured/channels``, ``/nominal/...``."""
-    path.unlink(missing_ok=True)
     stamps = np.round(holdout.time * 1e9).astype(np.int64)
-    measured = np.where(holdout.weight > 0.0, holdout.measured, np.nan)
-    tables = {"/measured": measured} | {PREFIXES[name]: run for name, run in runs.items()}
-    if "best" in runs:
-        tables["/residual"] = measured - runs["best"]
-    writer = LogWriter(path, {"diagnosis": {"log": holdout.name, "rig": model.description.name}}, bag_folder=False)
-    complete = False
-    try:
-        for prefix, table in tables.items():
-            channel, encoder = writer.add_topic(f"{prefix}/channels", JOINT), JointEncoder("rig", model.channels)
-            for stamp, row in zip(stamps.tolist(), table.tolist(), strict=True):
-                writer.write(channel, encoder.encode(stamp, row), stamp)
-        complete = True
-    finally:
-        writer.finish(complete, "" if complete else "the diagnosis was interrupted")
+    with new_residual_log(path, {"log": holdout.name, "rig": model.description.name}) as writer:
+        for prefix, table in tables_of(holdout, runs).items():
+            write_joints(writer, f"{prefix}/channels", "rig", model.channels, stamps, table)
 
 
 def save_rig(found: Diagnosis, model: OwnRig, path: Path) -> Path:
