@@ -102,6 +102,8 @@ class ChunkHeader(NamedTuple):
 
 
 _CHUNK_HEAD = struct.Struct("<QQQ")
+_NAME_AT = _CHUNK_HEAD.size + 4  # of the compression's name in a chunk: behind times, size and CRC
+_NAME, _CONTENT = struct.Struct("<I"), struct.Struct("<Q")  # lengths of that name and of the content
 
 
 @dataclass
@@ -234,7 +236,7 @@ def _blocks(scan: _Scan) -> Iterator[Block]:
             if frame is None:
                 raise DamageError("broken or unfinished record", scan.contents.path, position)
             block = _take(scan, frame)
-            position = frame.end
+            position = _end(scan, frame)
         except DamageError as error:
             position = _skip(scan, frame, position, error)
             continue
@@ -263,6 +265,19 @@ def _take(scan: _Scan, frame: Frame) -> Block | None:
     elif frame.opcode == Opcode.DATA_END:
         _finish(scan, frame)
     return None
+
+
+def _end(scan: _Scan, frame: Frame) -> int:
+    """Where the next record begins. A chunk says twice how long it is: where its content is whole, that length is
+    right, and a record that claims to be longer must not swallow the chunks behind it."""
+    if frame.opcode != Opcode.CHUNK:
+        return frame.end
+    (name,) = _NAME.unpack_from(scan.buffer, frame.begin + _NAME_AT)
+    (content,) = _CONTENT.unpack_from(scan.buffer, frame.begin + _NAME_AT + _NAME.size + name)
+    end = frame.begin + _NAME_AT + _NAME.size + name + _CONTENT.size + content
+    if end != frame.end:
+        scan.notes.append(f"the length of the chunk at byte {frame.start} is wrong; its content is whole")
+    return int(end)
 
 
 def _finish(scan: _Scan, frame: Frame) -> None:
