@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.practice import OTHER_WRITER, labels
 from helpers.small_logs import (
     NAMES,
     PERIOD,
@@ -64,8 +65,9 @@ def test_a_good_log_keeps_the_contract(tmp_path: Path) -> None:
     assert result.exit_code == 0 and "0 error, 0 warning" in result.output
 
 
-def test_the_sample_logs_keep_the_contract(shared: Path) -> None:
-    for path in sorted((shared / "logs" / "practice").glob("*.mcap")):
+def test_the_practice_logs_keep_the_contract(practice: Callable[[str], Path]) -> None:
+    paths = [OTHER_WRITER, *(practice(f"{label['name']}-{part}") for label in labels() for part in ("fit", "holdout"))]
+    for path in paths:
         assert not breaks_contract(check_conformance(read_log(path))), path.name
 
 

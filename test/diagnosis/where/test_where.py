@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.practice import labels
 from helpers.rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
@@ -354,11 +354,10 @@ def true_places(label: dict) -> set[str]:  # type: ignore[type-arg]
 
 
 @pytest.mark.slow
-def test_the_practice_logs_are_located_exactly(shared: Path) -> None:
+def test_the_practice_logs_are_located_exactly(practice: Callable[[str], Path]) -> None:
     """Made by other software with other laws: each pair's places and no others; flat where nothing is wrong."""
-    folder = shared / "logs" / "practice"
-    for label in json.loads((folder / "labels.json").read_text()):
-        fit, holdout = (read_signals(folder / f"{label['name']}-{part}.mcap") for part in ("fit", "holdout"))
+    for label in labels():
+        fit, holdout = (read_signals(practice(f"{label['name']}-{part}")) for part in ("fit", "holdout"))
         location = locate(RigModel(fit.rig), [fit], holdout)
         assert set(location.chosen) == true_places(label), label["name"]
         assert location.flat == (not true_places(label)), label["name"]
