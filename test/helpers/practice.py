@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The practice logs as test/data/practice holds them: columns of whole numbers, packed; and the logs made of them again.
+"""The practice logs as test/data/practice holds them, columns of whole numbers, packed; and the logs made of them.
 
     python test/helpers/practice.py FOLDER [NAME...]     # packs the pairs of a folder anew
 
