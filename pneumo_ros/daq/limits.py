@@ -13,7 +13,7 @@ WARN_HOLD = 1.0  # s back inside before a warning ends; a quantity that hovers a
 
 
 class LimitMonitor:
-    """Watches the measured quantities of :data:`~pneumo_ros.daq.safety_config.MEASURED`; call :meth:`step` with every valid sample."""
+    """Watches the measured quantities of the safety configuration; call :meth:`step` with every valid sample."""
 
     def __init__(self, limits: Mapping[str, Limit]) -> None:
         self._limits = [limits[name] for name in MEASURED]
