@@ -25,9 +25,10 @@ from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 from pneumo_ros.diagnosis.model import Model, Record
 from pneumo_ros.diagnosis.result import Diagnosis, Experiment, Gap
-from pneumo_ros.diagnosis.search.competition import Effort, Progress, Search, compete
+from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.diagnosis.traits import HasLimits
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active

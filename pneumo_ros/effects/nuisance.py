@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 
-from pneumo_ros.effects.contract import (
-    Plant,
-)
+from pneumo_ros.effects.contract import Plant
 from pneumo_ros.effects.parameters import Parameter
 from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET, Gas
 from pneumo_ros.plant.half_car import HalfCar, half_car

@@ -10,10 +10,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.effects.composition import Compiled, Slot, compose
-from pneumo_ros.effects.contract import (
-    Effect,
-    ends_of,
-)
+from pneumo_ros.effects.contract import Effect, ends_of
 from pneumo_ros.effects.parameters import Active
 
 

@@ -13,7 +13,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
-from pneumo_ros.diagnosis.search.competition import Progress
+from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
 from pneumo_ros.effects.configured import library_of, with_files

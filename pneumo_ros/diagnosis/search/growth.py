@@ -16,9 +16,11 @@ from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.search.competition import Search, probed, room_for_more, short_fits, varied
+from pneumo_ros.diagnosis.search.competition import room_for_more
+from pneumo_ros.diagnosis.search.fitting import probed, short_fits, varied
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
+from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
 MOST = 6  # effects in a structure

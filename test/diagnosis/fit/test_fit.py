@@ -17,7 +17,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
-from pneumo_ros.diagnosis.search.competition import starts_elsewhere
+from pneumo_ros.diagnosis.search.fitting import starts_elsewhere
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, trials, visibility
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
