@@ -74,6 +74,14 @@ class HasCoarse(Protocol):
 
 
 @runtime_checkable
+class HasChanges(Protocol):
+    """A model that sees what the configuration of another record states differently."""
+
+    def changes(self, record: Any) -> dict[str, float]:
+        """Factor on each parameter that differs, by name."""
+
+
+@runtime_checkable
 class HasDerived(Protocol):
     """An effect whose parameters give further quantities together."""
 

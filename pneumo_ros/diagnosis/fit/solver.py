@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
-from pneumo_ros.diagnosis.fit.box import bounded_newton as bounded_newton
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -32,9 +33,11 @@ from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level,
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.errors import InputError
 
-LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
-NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
-STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
+# Shares of the nominal model's misfit outside which another fold is kept from the fit [taste]
+LOPSIDED: Final = (0.1, 0.6)
+# Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
+NOT_EVIDENT: Final = 0.9
+STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 
 
 def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Search:

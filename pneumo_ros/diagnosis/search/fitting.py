@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Final
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
@@ -14,7 +15,7 @@ from pneumo_ros.diagnosis.search.screening import CandidateScore
 from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.effects.parameters import EffectParameter
 
-PROBE = 5  # iterations of the fit of a probed candidate
+PROBE: Final = 5  # iterations of the fit of a probed candidate [numerics]
 
 
 def rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
