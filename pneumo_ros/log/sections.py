@@ -130,8 +130,8 @@ def take_record(contents: Contents, opcode: int, body: bytes, offset: int) -> No
     elif opcode == Opcode.METADATA:
         contents.metadata.append(parse(Metadata, body, contents.path, offset))
     elif opcode == Opcode.ATTACHMENT:
-        promised = struct.unpack("<I", body[-4:].rjust(4, b"\0"))[0]
-        if promised and zlib.crc32(body[:-4]) != promised:
+        stated = struct.unpack("<I", body[-4:].rjust(4, b"\0"))[0]
+        if stated and zlib.crc32(body[:-4]) != stated:
             raise DamageError("CRC error of an attachment", contents.path, offset)
         contents.attachments.append(parse(Attachment, body, contents.path, offset))
 
@@ -148,8 +148,8 @@ def check_sections(buffer: mmap.mmap | bytes, summary: list[Frame], contents: Co
     """
     end, path = summary[0], contents.path
     if end.opcode == Opcode.DATA_END and end.end - end.begin == 4:
-        promised = struct.unpack_from("<I", buffer, end.begin)[0]
-        if promised and zlib.crc32(memoryview(buffer)[: end.start]) != promised:
+        stated = struct.unpack_from("<I", buffer, end.begin)[0]
+        if stated and zlib.crc32(memoryview(buffer)[: end.start]) != stated:
             raise DamageError("CRC error of the data section ending", path, end.start)
     elif end.opcode == Opcode.DATA_END:
         raise DamageError("broken end of data", path, end.start)

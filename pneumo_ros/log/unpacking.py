@@ -75,7 +75,7 @@ def decompress(chunk: Chunk, path: object, offset: int) -> bytes:
     Raises
     ------
     DamageError
-        if the content does not decompress to what the chunk promises.
+        if the content does not decompress to what the chunk states.
     """
     if max(chunk.uncompressed_size, len(chunk.data)) > chunk_limit():
         large = max(chunk.uncompressed_size, len(chunk.data))
@@ -92,7 +92,7 @@ def decompress(chunk: Chunk, path: object, offset: int) -> bytes:
 
 
 def _decompressed(chunk: Chunk) -> bytes:
-    # Nothing is allocated for a size that only the compressed data state, and unpacking ends one byte past the promise.
+    # Nothing is allocated for a size that only the compressed data state, and unpacking ends one byte past it.
     most = chunk.uncompressed_size + 1
     if chunk.compression == "zstd":
         size = zstandard.frame_content_size(chunk.data)

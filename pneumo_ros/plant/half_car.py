@@ -180,8 +180,8 @@ def accelerations(
     spring_rear: float,
     tyre_front: float,
     tyre_rear: float,
-    lift: float,
-    turn: float,
+    extra_force: float,
+    extra_moment: float,
     body: Body,
 ) -> tuple[float, float, float, float]:
     """Newton's law for body and axles (Eqs. 4.63-4.66): heave, m/s2, pitch, rad/s2, front and rear axle, m/s2.
@@ -190,12 +190,12 @@ def accelerations(
     ----------
     spring_front, spring_rear : N, positive upwards on the body
     tyre_front, tyre_rear : N, positive upwards on the axle
-    lift, turn : what else acts on the body, N and N m nose up
+    extra_force, extra_moment : what else acts on the body, N and N m nose up
     body : masses and arms
     """
     return (
-        (spring_front + spring_rear + lift) / body.sprung_mass - GRAVITY,
-        (body.front_arm * spring_front - body.rear_arm * spring_rear + turn) / body.pitch_inertia,
+        (spring_front + spring_rear + extra_force) / body.sprung_mass - GRAVITY,
+        (body.front_arm * spring_front - body.rear_arm * spring_rear + extra_moment) / body.pitch_inertia,
         (tyre_front - spring_front) / body.unsprung_mass_front - GRAVITY,
         (tyre_rear - spring_rear) / body.unsprung_mass_rear - GRAVITY,
     )
