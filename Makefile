@@ -8,7 +8,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint types unit colcon floors headers bench docs real blind blind-ci lock clean help
+.PHONY: demo test lint types unit colcon floors headers bench mutants docs real blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
@@ -81,6 +81,20 @@ SPEED := kernel composed control_step reading replay lockstep
 bench: $(READY)  ## Every speed, side by side with its limit
 	for name in $(SPEED); do echo "== $$name"; $(BIN)/python bench/$$name.py || exit 1; done
 
+# An environment of its own: what cosmic-ray brings along is no business of the package.
+MUTANTS := .venv-mutants
+MUTANTS_READY := $(MUTANTS)/.ready
+MODULE ?= units
+
+$(MUTANTS_READY): requirements.lock setup.py package.xml
+	$(PYTHON) -m venv $(MUTANTS)
+	$(MUTANTS)/bin/python -m pip install --quiet --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(MUTANTS)/bin/python -m pip install --quiet --quiet --disable-pip-version-check --no-build-isolation --editable '.[mutants]'
+	@touch $@
+
+mutants: $(MUTANTS_READY)  ## Small changes of MODULE (units, frames, safety ...) that no test notices; docs/mutants.md
+	$(MUTANTS)/bin/python bench/mutants.py $(MODULE)
+
 BLIND ?= build/blind
 
 blind: $(READY)  ## The full blind check, 280 sealed cases (two hours on 2 cores); goes on where it was interrupted
@@ -107,4 +121,4 @@ lock:  ## Resolve requirements.lock anew for Python 3.10 to 3.13 (needs uv)
 		--generate-hashes --no-emit-index-url --no-annotate --no-header --output-file requirements.lock
 
 clean:  ## Remove the virtual environment and what was built
-	rm -rf $(VENV) $(FLOORS) build *.egg-info bench/build
+	rm -rf $(VENV) $(FLOORS) $(MUTANTS) build *.egg-info bench/build

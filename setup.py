@@ -73,6 +73,7 @@ setup(
         "parquet": ["pyarrow>=15"],
         "view": ["bokeh>=3.4,<4"],
         "test": TESTING,
+        "mutants": ["cosmic-ray>=8.4"],
         "dev": [*TESTING, "pytest-xdist>=3.7", "ruff>=0.6", "mypy>=1.11", "types-PyYAML>=6"],
     },
     data_files=[

@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.search.competition import Effort, Search, compete
+from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.selection import Scored, advantage, score
+from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel

@@ -12,7 +12,8 @@ from helpers import sessions
 
 from pneumo_ros.cli.reference import documents
 from pneumo_ros.log import topics
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.interfaces import message_class
 
 PLAUSIBLE = {  # unit -> largest magnitude a running rig can show
@@ -65,7 +66,7 @@ def test_generated_docs_are_up_to_date(name: str) -> None:
 
 
 def test_every_declared_parameter_says_what_it_is() -> None:
-    from pneumo_ros.cli.run import node_tables
+    from pneumo_ros.cli.session_plan import node_tables
 
     for node, table in node_tables().items():
         for p in table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +14,27 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 NO_SKIP = "PNEUMO_NO_SKIP"  # set in CI: a skip is an error there, unless it is one of these
 ALLOWED_SKIPS = {
-    "reference data not found": "practice logs and other people's measurements do not ship with the package",
+    "reference data not found": "other people's measurements do not ship with the package",
     "this computer stalled too long": "a timeout was right to trip before the scenario began, several times in a row",
 }
 
 
 @pytest.fixture(scope="session")
 def shared() -> Path:
-    """Folder with the sample logs and real measurements that do not ship with the package."""
+    """Folder with the real measurements that do not ship with the package."""
     folder = Path(os.environ.get("PNEUMO_SHARED", ROOT.parent / "shared"))
     if not folder.is_dir():
         pytest.skip(f"reference data not found at {folder}; set PNEUMO_SHARED to its folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def practice(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """A practice log by its name, "leak-front-fit" for example, see test/data/README.md."""
+    from helpers.practice import made
+
+    folder = tmp_path_factory.mktemp("practice")
+    return lambda name: made(name, folder)
 
 
 @pytest.fixture(autouse=True)

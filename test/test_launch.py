@@ -14,7 +14,7 @@ import pytest
 import yaml
 from helpers.folders import ROOT
 
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.session_plan import node_tables
 
 TREE = ast.parse((ROOT / "launch" / "rig.launch.py").read_text(encoding="utf-8"))
 

@@ -3,6 +3,19 @@
 
 The contract's closure (Eq. 4.22 with the polytropic temperature) is the limit without heat; with heat the gas has a
 mass and a temperature of its own.
+
+Kernel arguments
+----------------
+opening : of the valve, m2
+pressure, supply : absolute, Pa, in the spring and before the inlet valve
+temperature : of the gas that flows, K
+height, height_rate : of the spring, m and m/s, extension positive
+mass : of the spring's air, kg
+inflow, outflow : kg/s
+front, rear : absolute pressures of the two springs, Pa
+target, value, rate : of a second order lag, any unit, and its rate per second
+frequency, ratio : natural frequency, rad/s, and damping ratio, 1
+time, duration : since the start, and of the whole run, s
 """
 
 from __future__ import annotations

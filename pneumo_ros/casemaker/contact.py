@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces between body, axle and ground that the nominal rig does not have: friction, bellows, stop, tyre."""
+"""Forces between body, axle and ground that the nominal rig does not have: friction, bellows, stop, tyre.
+
+Kernel arguments
+----------------
+height, speed : of the strut, m and m/s, extension positive
+bristle, memory : deflection of the friction's bristle and of the hysteresis, m
+deflection, rate, static : of the tyre (road minus axle), m and m/s, and its deflection at rest, m
+x, dx, at : state and its rate (SIZE,), written in place, and where the tyre's memory stands in them
+rows : (ROWS, COLUMNS) second laws of this end, see :mod:`pneumo_ros.casemaker.laws.slots`
+"""
 
 from __future__ import annotations
 

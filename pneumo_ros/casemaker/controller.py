@@ -2,6 +2,13 @@
 """Controllers that run inside the simulated rig: slow levelling, and an active one with a boundary layer.
 
 Both see the sensors' values, noise and faults included, once a period.
+
+Kernel arguments
+----------------
+memory : (2,) filtered height, m, and integral of the error, m s
+height, target : of the spring, as measured and wanted, m
+rest : inlet opening at rest, m2
+period : s
 """
 
 from __future__ import annotations

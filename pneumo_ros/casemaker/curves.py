@@ -4,6 +4,14 @@
 The effect's own part is what the rig's equations give with it less what they give without it, at the very states of the
 session. A law with a memory has no single curve: the mean over the session at each value of the coordinate is stated.
 Forces act on the body, N upwards (on the axle for the tyre's); rates are of extension (of compression for the tyre).
+
+Kernel arguments
+----------------
+states : (N, SIZE) of the session
+road, speed : (N,) height of the ground, m, and its rate, m/s
+spool, outlet : (N,) position of the inlet's spool and the constant outlet opening, m2
+at, index : first of the end's own states, and which end (0 front, 1 rear)
+rows : (ROWS, COLUMNS) second laws of this end
 """
 
 from __future__ import annotations

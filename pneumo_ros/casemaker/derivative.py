@@ -5,6 +5,20 @@ State: 0-9 as :mod:`pneumo_ros.plant.half_car`; then one block of 21 for each en
 mode and rate, spool and rate, air mass, exciter and rate, line flow and rate, gauge and rate, five sliders, wall
 temperature, second chamber's pressure, tyre's memory), then tank pressure, loose payload and rate, exciter base and
 rate, flow that refills the tank. A state whose effect is off stays where it starts.
+
+Kernel arguments
+----------------
+x, dx : (SIZE,) state, and its rate, which is written
+at, index : first of the end's own states, and the state that holds its pressure (8 front, 9 rear)
+height, speed : of the strut, m and m/s, extension positive; heights, speeds of both ends
+pressure, supply : absolute, Pa
+temperature, gas : of the air at the inlet and in the spring, K
+spool, outlet : position of the inlet's spool and opening of the outlet, m2; spools, outlets of both ends
+spring : force of the spring alone, N
+across : flow from this spring to the other one, kg/s
+age, time, duration : share of the run gone, 0..1, and time and length of the run, s
+road, road_rate : commanded ground, m and m/s
+rows, laws : second laws of this end (ROWS, COLUMNS), and of both (2, ROWS, COLUMNS)
 """
 
 from __future__ import annotations

@@ -1,5 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the richer rig: RK4 at a fixed step, valves and controller in the loop, sensors sampled every period."""
+"""Runs the richer rig: RK4 at a fixed step, valves and controller in the loop, sensors sampled every period.
+
+Kernel arguments
+----------------
+x : (SIZE,) state
+at, index : first of the end's own states, and the state that holds its pressure (8 front, 9 rear)
+arm, unsprung : signed distance of the strut from the centre of gravity, and height of the axle, m
+inlet : opening at rest, m2
+true : what a sensor looks at, m or Pa
+time : s
+memory, slot : (2,) positions of the sensors' rod ends, m, updated in place, and which of them
+law, rows, laws : a sensor's second law (COLUMNS,), those of an end (ROWS, COLUMNS), of both (2, ROWS, COLUMNS)
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,13 @@
 
 The second order lag of the spool is part of the differential equations; what has a memory but no rate is here and
 moves once a step.
+
+Kernel arguments
+----------------
+commands : (N,) one row a period, m2
+time, delay, period : s
+law : (COLUMNS,) second law of the delay, see :mod:`pneumo_ros.casemaker.laws.ground`
+spool : position, m2
 """
 
 from __future__ import annotations

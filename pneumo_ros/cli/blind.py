@@ -131,13 +131,13 @@ def _refuse_other_set(folder: Path, set_name: str) -> None:
 
 
 def _run(what: str, work: Any, items: list[Any], names: list[str], workers: int, scheduler: str) -> None:
-    from pneumo_ros.cli.blind_batch import run_all
+    from pneumo_ros.workers import run_each
 
     by_item = dict(zip(items, names, strict=True))
     failed = []
     with _bar() as progress:
         task = progress.add_task(what, total=len(items))
-        for item, error in run_all(work, items, workers, scheduler or None):
+        for item, error in run_each(work, items, workers, scheduler or None):
             progress.advance(task)
             if error:
                 failed.append(by_item[item])

@@ -98,7 +98,7 @@ def _piece(one: Session, output: Path, model: Path | None, rig: Path | None, pai
 
 def _run(console: Console, pieces: Mapping[Piece, Session], workers: int, scheduler: str) -> dict[str, str]:
     """Diagnose what is not finished; why a log could not be, by its name."""
-    from pneumo_ros.cli.blind_batch import run_all
+    from pneumo_ros.workers import run_each
 
     left = [piece for piece in pieces if not finished(piece)]
     problems: dict[str, str] = {}
@@ -107,7 +107,7 @@ def _run(console: Console, pieces: Mapping[Piece, Session], workers: int, schedu
     with Progress(TextColumn("diagnosing"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
                   TimeRemainingColumn(), console=console) as progress:  # fmt: skip
         task = progress.add_task("", total=len(left))
-        for piece, error in run_all(diagnose_piece, left, max(1, min(workers, len(left))), scheduler or None):
+        for piece, error in run_each(diagnose_piece, left, max(1, min(workers, len(left))), scheduler or None):
             progress.advance(task)
             if error:
                 problems[pieces[piece].name] = error.removeprefix("InputError: ")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write what is made from tables: docs/topics.md, docs/parameters.md, docs/families.md, config/layouts/ and urdf/.
+"""Write what is made from tables: topics, parameters, effects, families and constants in docs/, config/layouts/, urdf/.
 
 `make docs` runs it; tests hold the files up to date.
 """
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.constants_page import constants_page
+from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.cli.topics_page import topics_page
 from pneumo_ros.dashboard.viewer_layouts import LAYOUTS
 from pneumo_ros.effects.loading import laws_of, load_library
@@ -58,6 +59,7 @@ def documents() -> dict[str, str]:
     page = EFFECTS_HEAD + effects_page(laws_of(load_library()))
     return {
         "effects.md": page,
+        "constants.md": constants_page(),
         "families.md": FAMILIES_HEAD + families_page(),
         "topics.md": topics_page(),
         "parameters.md": PARAMETERS_HEAD + "\n".join(parts),

@@ -20,7 +20,7 @@ from pneumo_ros.documents import parse_json
 from pneumo_ros.errors import InputError
 
 if TYPE_CHECKING:
-    from pneumo_ros.log.reading import Log
+    from pneumo_ros.log.decoded import Log
     from pneumo_ros.rig import Rig
     from pneumo_ros.session.replay import Replayed
     from pneumo_ros.session.rerun import Rerun

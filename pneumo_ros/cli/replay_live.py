@@ -19,7 +19,7 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 
 from pneumo_ros.cli.terminal import Console
-from pneumo_ros.log.reading import Log
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.nodes.replay import Player, spinning, transport_of
 from pneumo_ros.nodes.spin import SignalStop
 

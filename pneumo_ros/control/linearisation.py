@@ -5,6 +5,15 @@ The thesis inverts the 2 x 2 matrix B of Eq. 6.73. B factors into the body's geo
 inverse is two steps: outputs' third derivatives -> force rates (geometry alone), force rate -> opening (one spring
 alone). The second is the quarter car's Eq. 6.14 and serves both cars. det B = 0 exactly where a spring's gain is zero:
 no flow because spring and supply have one pressure, or no area left (Eq. 6.89; errata 8).
+
+Kernel arguments
+----------------
+height, gauge : of the spring, m, and its pressure over ambient, Pa
+force_rate, pressure_rate : wanted, N/s and Pa/s
+ambient : absolute, Pa
+heave_jerk, pitch_jerk : wanted third derivatives, m/s3 and rad/s3
+mass, inertia : of the body, kg and kg m2
+front_arm, rear_arm : from the centre of gravity to the axles, m
 """
 
 from __future__ import annotations

@@ -3,6 +3,19 @@
 
 Order within a period, as in a session: the plant's state is measured, the estimator and the controller step, and their
 command holds from this sample (or ``delay`` periods later) to the next.
+
+Kernel arguments
+----------------
+x : (10,) plant state, see :mod:`pneumo_ros.rig.channels`
+command, trim_command : (4,) openings, m2: in force, and those at rest
+road, noise : (N + 1, 2) heights of the ground, m; (N, 6) sensor noise, m and Pa
+out : (16,) estimate, written in place
+delay : periods that a command takes to the valve
+exact, passive : the estimator is told the true kinematics; the valves stay at ``trim_command``
+period, steps : s, and RK4 steps in it
+derivatives, areas, gain : the estimator's state, (4, n + 1), (2,), (2, 2)
+gains : of its differentiators
+control : (8,) the controller's state
 """
 
 from __future__ import annotations

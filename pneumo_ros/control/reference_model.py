@@ -1,5 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reference model: a triple pole that leads the output smoothly to its set point (Sections 6.4 and 6.7.2)."""
+"""The reference model: a triple pole that leads the output smoothly to its set point (Sections 6.4 and 6.7.2).
+
+Kernel arguments
+----------------
+state : y_d, y_d', y_d''
+target : set point, in the output's unit
+pole, period : 1/s, s
+"""
 
 from __future__ import annotations
 

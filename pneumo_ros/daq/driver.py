@@ -19,8 +19,9 @@ import serial
 
 from pneumo_ros.daq.actuation import Applied, Mode
 from pneumo_ros.daq.calibration import SENSORS, Calibration
-from pneumo_ros.daq.core import DriverCore, Phase
+from pneumo_ros.daq.core import DriverCore
 from pneumo_ros.daq.intake import Measurement
+from pneumo_ros.daq.link import Phase
 from pneumo_ros.daq.reasons import Event, Level, Reason
 from pneumo_ros.daq.safety_config import SafetyConfig
 from pneumo_ros.errors import InputError

@@ -6,23 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from pneumo_ros.daq.reasons import Finding, Level, Reason
-from pneumo_ros.daq.safety_config import Limit
+from pneumo_ros.daq.safety_config import MEASURED, Limit
 
 RATE_FILTER = 0.005  # s, first-order low-pass of the height rates: one noisy count must not look like motion
 WARN_HOLD = 1.0  # s back inside before a warning ends; a quantity that hovers at its limit is one warning, not a flood
-MEASURED = (
-    "front_height",
-    "rear_height",
-    "front_height_rate",
-    "rear_height_rate",
-    "front_pressure",
-    "rear_pressure",
-    "supply_pressure",
-)
 
 
 class LimitMonitor:
-    """Watches the measured quantities of :data:`MEASURED`; call :meth:`step` with every valid sample."""
+    """Watches the measured quantities of the safety configuration; call :meth:`step` with every valid sample."""
 
     def __init__(self, limits: Mapping[str, Limit]) -> None:
         self._limits = [limits[name] for name in MEASURED]

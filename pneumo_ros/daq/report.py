@@ -6,9 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.daq.core import DriverCore, Phase
+from pneumo_ros.daq.core import DriverCore
 from pneumo_ros.daq.driver import SerialDriver
 from pneumo_ros.daq.frames import Reject
+from pneumo_ros.daq.link import Phase
 from pneumo_ros.daq.reasons import Level
 
 

@@ -14,7 +14,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.paths import share_file
 from pneumo_ros.rig.channels import VALVES
 
-QUANTITIES = (
+MEASURED = (
     "front_height",
     "rear_height",
     "front_height_rate",
@@ -22,8 +22,8 @@ QUANTITIES = (
     "front_pressure",
     "rear_pressure",
     "supply_pressure",
-    "command_area",
 )
+QUANTITIES = (*MEASURED, "command_area")
 ACTIONS = ("trip", "estop")
 REACTION = 0.05  # s within which the valves must be safe
 

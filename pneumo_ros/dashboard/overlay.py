@@ -31,7 +31,7 @@ from pneumo_ros.dashboard.shell import furnish, side_by_side, wrapping
 from pneumo_ros.dashboard.viewer_layouts import RESIDUAL, RUNS
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import align, start_of
-from pneumo_ros.log.reading import Log
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.topics import DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE
 
 CHANNELS = (*DISPLACEMENT.names, "front_pressure", "rear_pressure")

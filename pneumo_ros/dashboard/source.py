@@ -12,8 +12,8 @@ import numpy as np
 from pneumo_ros.dashboard.panels import SHOWN, Samples
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
+from pneumo_ros.log.decoded import JOINT_STATE, Log
 from pneumo_ros.log.inspection import Event, read_events
-from pneumo_ros.log.reading import JOINT_STATE, Log
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig, load_rig
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.experiment import NextExperiment
-from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
+from pneumo_ros.diagnosis.fit.shooting import Sliceable
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
@@ -23,21 +24,25 @@ from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_ru
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
-from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.model import Model, Record
 from pneumo_ros.diagnosis.result import Diagnosis, Gap
-from pneumo_ros.diagnosis.search.competition import Effort, Progress, Search, compete
+from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
+from pneumo_ros.diagnosis.traits import HasLimits
 from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 
+Piece = TypeVar("Piece", bound=Sliceable)
 Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
-LIKELY = 0.05  # share of a place from which a remainder is looked for there
-SEEN = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log
-MOSTLY = 0.5  # share of the library that is hidden, above which "none" would say nothing
-FEWEST = 16  # rows of a record
-SPLIT = 0.65  # share of a lone log that is fitted; the rest is held out
+LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
+SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]
+# Share of the library that the excitation cannot show, above which "none" would say nothing [taste]
+MOSTLY: Final = 0.5
+FEWEST: Final = 16  # rows of a record at least [numerics]
+SPLIT: Final = 0.65  # share of a lone log that is fitted; the rest is held out [taste]
 
 
 @dataclass(frozen=True)
@@ -67,11 +72,11 @@ class Options:
 
 def diagnose(
     model: Model,
-    fit_logs: Sequence[Any],
-    holdout: Any,
+    fit_logs: Sequence[Record],
+    holdout: Record,
     options: Options | None = None,
     progress: Progress | None = None,
-    edit: Any | None = None,
+    edit: Record | None = None,
 ) -> Diagnosis:
     """Diagnose logs with a model.
 
@@ -97,7 +102,7 @@ def diagnose(
     return _within_limits(_report(outcome, opinion, options, tell, edit), [*fit_logs, holdout])
 
 
-def _check_records(model: Model, records: Sequence[Any]) -> None:
+def _check_records(model: Model, records: Sequence[Record]) -> None:
     """Refuse records of another shape than the model's, before anything is fitted to them.
 
     Raises
@@ -117,7 +122,7 @@ def _check_records(model: Model, records: Sequence[Any]) -> None:
                              remedy="fill the gaps and give them no weight")  # fmt: skip
 
 
-def _outcome(search: Search, holdout: Any, options: Options, tell: Progress) -> Outcome:
+def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) -> Outcome:
     problem = search.problem
     refit = score(problem, search.refit)
     finalists = tuple(score(problem, f) for f in search.finalists)
@@ -162,28 +167,29 @@ def _without_effects(outcome: Outcome) -> Outcome:
                    runs={**runs, "best": runs["refit"]})  # fmt: skip
 
 
-def _within_limits(found: Diagnosis, records: Sequence[Any]) -> Diagnosis:
+def _within_limits(found: Diagnosis, records: Sequence[Record]) -> Diagnosis:
     """What the logs' own limitations leave of the verdict."""
-    limitations = [(r.name, one) for r in records for one in getattr(r, "limitations", ())]
+    limited = [r for r in records if isinstance(r, HasLimits)]
+    limitations = [(r.name, one) for r in limited for one in r.limitations]
     if not limitations:
         return found
     notes = (*found.notes, *dict.fromkeys(f"{name}: {one.text}" for name, one in limitations))
     cap = min(one.cap for _, one in limitations)
-    blocked = any(getattr(r, "blocked", False) for r in records)
+    blocked = any(r.blocked for r in limited)
     verdict = "not_testable" if blocked else found.verdict
     cap = 0.0 if blocked else cap
     ranking = tuple(replace(one, probability=min(one.probability, cap)) for one in found.ranking)
     return replace(found, verdict=verdict, probability=min(found.probability, cap), ranking=ranking, notes=notes)
 
 
-def split_by_time(fit_logs: Sequence[Any]) -> tuple[list[Any], Any]:
+def split_by_time(fit_logs: Sequence[Piece]) -> tuple[list[Piece], Piece]:
     """The last log's end becomes the held-out record (with an initial state of its own)."""
     last = fit_logs[-1]
     cut = int(len(last.measured) * SPLIT)
     return [*fit_logs[:-1], last.slice(0, cut)], last.slice(cut, len(last.measured))
 
 
-def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress, edit: Any | None) -> Diagnosis:
+def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress, edit: Record | None) -> Diagnosis:
     problem, search, holdout, best = outcome.problem, outcome.search, outcome.holdout, outcome.best
     tell(0.95, "ranking")
     ranking = rank(outcome, opinion)
@@ -231,11 +237,11 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
 
 def _on_held_out(outcome: Outcome) -> HeldOutGaps:
     floor, runs = total_floor(outcome.holdout), outcome.runs
-    form = float(getattr(outcome.holdout, "model_form", 0.0))
+    form = stated_form(outcome.holdout)
     return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, form / floor)
 
 
-def _gap(model: Model, holdout: Any, runs: Mapping[str, HeldOut]) -> Gap:
+def _gap(model: Model, holdout: Record, runs: Mapping[str, HeldOut]) -> Gap:
     floor = noise_floor(holdout)
     table = {name: run.channels for name, run in runs.items()} | {"noise_floor": floor}
     per_channel = {c: {name: float(v[k]) for name, v in table.items()} for k, c in enumerate(model.channels)}
@@ -318,6 +324,6 @@ def _hidden(problem: Problem, search: Search) -> dict[str, str]:
     return out
 
 
-def _trajectories(holdout: Any, runs: Mapping[str, HeldOut]) -> dict[str, Array]:
-    time = np.arange(len(holdout.measured)) * holdout.period
+def _trajectories(holdout: Record, runs: Mapping[str, HeldOut]) -> dict[str, Array]:
+    time = np.arange(len(holdout.measured), dtype=np.float64) * holdout.period
     return {"time": time, "log": np.asarray(holdout.measured), **{name: run.predicted for name, run in runs.items()}}

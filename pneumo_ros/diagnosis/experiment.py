@@ -9,15 +9,15 @@ what remains is compared with the sensors' noise.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem, average
 from pneumo_ros.diagnosis.fit.solver import Fit
 
-SEPARATES = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart
-STEP = 0.5  # prior sigmas, for the nuisance parameters' answer
+SEPARATES: Final = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart [taste]
+STEP: Final = 0.5  # prior sigmas by which a nuisance parameter is moved to see its answer [numerics]
 
 
 class NextExperiment(Protocol):

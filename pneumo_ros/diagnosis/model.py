@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.traits import HasSiteParameters
 from pneumo_ros.effects.parameters import Active, Curve, EffectParameter, Parameter
 
 
@@ -31,7 +32,7 @@ class EffectLike(Protocol):
 
 def parameters_at(effect: EffectLike, site: str) -> tuple[EffectParameter, ...]:
     """Parameters of an effect where it acts: their units and usual sizes may differ from site to site."""
-    own: Mapping[str, tuple[EffectParameter, ...]] = getattr(effect, "by_site", {})
+    own = effect.by_site if isinstance(effect, HasSiteParameters) else {}
     return own.get(site, effect.parameters)
 
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,7 +17,8 @@ from pneumo_ros.diagnosis.experiment import SEPARATES, NextExperiment, refusal
 from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
-ROAD_FILE, VALVE_FILE = "next_experiment_road.csv", "next_experiment_valves.csv"
+ROAD_FILE: Final = "next_experiment_road.csv"  # name of a file beside the report [definition]
+VALVE_FILE: Final = "next_experiment_valves.csv"  # name of a file beside the report [definition]
 
 
 @dataclass(frozen=True)

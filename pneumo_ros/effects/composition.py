@@ -48,8 +48,9 @@ CORRECTIONS = (
 class PlantTerm:
     """What an effect adds inside the compiled kernel: compiled functions of module level, each optional.
 
-    ``z`` is the tuple of the term's own states, ``p`` of its parameter values; the signals are those of
-    :mod:`pneumo_ros.effects.hooks`.
+    Of their arguments, ``strut``, ``air`` and ``tyre`` are the signals of :mod:`pneumo_ros.effects.hooks` at the term's
+    end (``front``, ``rear``: the air of both, for a term that they share), ``z`` is the tuple of the term's own states,
+    ``p`` its parameters in the order of ``EFFECT.parameters``, SI, and ``dt`` a step of the integration, s.
 
     Attributes
     ----------

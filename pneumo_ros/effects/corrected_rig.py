@@ -188,11 +188,11 @@ class CorrectedRig:
 
 
 def _tyre_forces(rates: Array, plant: Plant) -> Array:
-    """(2,) N upwards on the axles, from accelerations of heave, pitch and axles (4,): Eqs. 4.63-4.68 turned round."""
+    """(2,) N upwards on the axles, from accelerations of heave, pitch and axles (4,): Eqs. 4.63-4.68 solved."""
     body = plant.body
-    lift, turn = body.sprung_mass * (rates[0] + GRAVITY), body.pitch_inertia * rates[1]
+    force, moment = body.sprung_mass * (rates[0] + GRAVITY), body.pitch_inertia * rates[1]
     base = body.front_arm + body.rear_arm
-    struts = np.array([(body.rear_arm * lift + turn) / base, (body.front_arm * lift - turn) / base])
+    struts = np.array([(body.rear_arm * force + moment) / base, (body.front_arm * force - moment) / base])
     masses = np.array([body.unsprung_mass_front, body.unsprung_mass_rear])
     return np.asarray(masses * (rates[2:] + GRAVITY) + struts)
 

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import Effect, Inputs, channels_of, ends_of
+from pneumo_ros.effects.drive import Drive
 from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of, tyre_of
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
-from pneumo_ros.effects.rig_model import Drive, RigModel
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.units import GAS_CONSTANT
 
 THINNED = 8e-3  # s between rows that are evaluated

@@ -3,6 +3,13 @@
 
 Each takes a block of samples and what the block before it left (None before the first), and gives the filtered block
 with what it leaves itself: a whole record at once, or one sample at a time, are the same numbers.
+
+Kernel arguments
+----------------
+a, b : the filter's two states
+u, following, last : input: the block (N,) or one sample, the next one, the one before the block
+fresh : nothing was filtered yet: the filter rests at the first sample
+A, B0, B1, C, D : of :class:`_Form`
 """
 
 from __future__ import annotations

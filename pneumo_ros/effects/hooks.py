@@ -3,6 +3,17 @@
 
 The nominal equations are those of :mod:`pneumo_ros.plant.half_car`; here their intermediate quantities have names so
 that a term of an effect can use them.
+
+Kernel arguments
+----------------
+top, axle, top_rate, axle_rate : heights above the ground datum, m, and their rates, m/s
+road, slope : height of the ground, m, and its rate, m/s
+gauge : pressure over ambient, Pa
+scale, damping, stiffness : factor on the area, 1; of the bushing, N s/m; of the tyre, N/m
+pressure, supply, supply_power : absolute, Pa, and (P_ref / supply)^((n - 1) / n), 1
+height, rate : of the spring, m and m/s, extension positive
+inlet, outlet : openings, m2
+mean_area : dV/dh, m2
 """
 
 from __future__ import annotations

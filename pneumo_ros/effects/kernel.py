@@ -7,6 +7,10 @@ does not shorten the step.
 
 :func:`simulate` calls the terms by the names of :mod:`pneumo_ros.effects.terms`, which hold nothing; a composed kernel
 is the same function over generated ones that hold a library.
+
+Kernel arguments
+----------------
+x : state (10,) of :mod:`pneumo_ros.plant.half_car`
 """
 
 from __future__ import annotations

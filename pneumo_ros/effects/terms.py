@@ -3,6 +3,13 @@
 
 Generated modules hold functions of these names for a library. ``z`` is a tuple with each term's own states at each end,
 ``flags`` whether it acts there, ``p`` its parameters there; ``s`` are the :class:`~pneumo_ros.effects.kernel.Signals`.
+
+Kernel arguments
+----------------
+on, values, inner : per term and end: whether it acts (K, 2), its parameters (K, 2, M), its own states (K, 2, S)
+z, flags, p : the same as tuples, one entry for each term and end
+s, loads : signals and loads of :mod:`pneumo_ros.effects.kernel`
+dt, drop : a step, s; how far the supply's pressure lies below the regulated one, Pa
 """
 
 from __future__ import annotations

@@ -4,6 +4,18 @@
 Eqs. 6.91-6.93 with what the rig has besides: gauge pressure makes force (errata 7) and bushing damping acts between
 body and axle. Measurements are those of
 :data:`~pneumo_ros.rig.channels.CHANNELS`, all values at one instant.
+
+Kernel arguments
+----------------
+d, derivatives : (4, n + 1) filtered values and derivatives of the four LVDTs, m, m/s, m/s2
+order, first : which derivative, and the column of the value itself
+measurement : (6,) four heights, m, and two absolute pressures, Pa
+gains : of the differentiators
+x : (16,) estimate: heave, pitch, their rates and accelerations, two heights with theirs, pressures, areas
+a, areas : (2,) area parameters, in units of the mean area or of 1 cm of height; areas they give, m2
+gain : (2, 2) of the least squares
+height, gauge : of a spring, m, and its pressure over ambient, Pa
+slopes : derivatives of the areas by their parameters, m2
 """
 
 from __future__ import annotations

@@ -18,6 +18,12 @@ R+ = e^(-lambda T) R + g W^T W, g = (1 - e^(-lambda T))/lambda, and R+ a+ = e^(-
 Written in P it cannot blow up at any gain or rate: the error shrinks by the factor e^(-lambda T) R+^-1 R <= 1. An
 explicit Euler step of Eqs. 6.50 and 6.53 loses positive P at lambda_0 T of order 1. The gradient step is implicit for
 the same reason.
+
+Kernel arguments
+----------------
+method : index into :data:`METHODS`
+P, M : (1, 1) or (2, 2) symmetric and positive; P is the gain
+forgetting, bound : lambda_0, 1/s, and k_0, the largest norm of P (Eq. 6.51)
 """
 
 from __future__ import annotations

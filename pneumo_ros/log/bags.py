@@ -10,16 +10,10 @@ from pathlib import Path
 
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.container import (
-    MAGIC,
-    Contents,
-    DamageError,
-    check_magic,
-    mapped,
-    read_blocks,
-    read_header,
-)
+from pneumo_ros.log.container import MAGIC, Contents, DamageError, check_magic
 from pneumo_ros.log.records import Gathered, Records, gather
+from pneumo_ros.log.sections import read_blocks, read_header
+from pneumo_ros.log.unpacking import mapped
 
 PROFILE = "ros2"
 PART = re.compile(r"(_\d+)?\.mcap(\.zstd)?$")  # how a part's name ends

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pneumo_ros.log.decoded import CONFIG_TOPIC, Log
 from pneumo_ros.log.inspection import final_parameters
-from pneumo_ros.log.reading import CONFIG_TOPIC, Log
 from pneumo_ros.log.tables import Table, table
 from pneumo_ros.log.topics import BY_NAME, ROAD, Topic
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
+from pneumo_ros.log.decoded import CONFIG_TOPIC, Log
 from pneumo_ros.log.inspection import CONTRACT_TOPICS, Timing, measure_timing
-from pneumo_ros.log.reading import CONFIG_TOPIC, Log
 from pneumo_ros.log.topics import JOINT, Topic
 from pneumo_ros.rig import LIMITS, Rig, load_rig
 

@@ -13,30 +13,23 @@ from __future__ import annotations
 
 import mmap
 import struct
-import tempfile
-import zlib
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from itertools import islice, takewhile
 from pathlib import Path
-from typing import BinaryIO, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Footer, Header, Metadata, Schema, Statistics
+from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.bounds import MAX_CHANNELS, MAX_DECLARATION, MAX_RATIO, MAX_RECORDS, MEBI, chunk_limit
 
 MAGIC = b"\x89MCAP0\r\n"
 FRAME = struct.Struct("<BQ")  # opcode and length before every record
 FOOTER_LENGTH = 20
 RECOVER = "pneumo log recover IN --output OUT keeps what is readable"
-LARGER = "no recorder writes this; if the log can be trusted, give a larger limit: pneumo --max-chunk MiB VERB"
 
 # In the data section these may stand, in any order; anything else there is a flipped opcode (or a future record).
 _DATA_RECORDS = {
@@ -120,54 +113,6 @@ def parse(kind: type[R], body: bytes, path: object, offset: int) -> R:
     return record
 
 
-@contextmanager
-def mapped(path: Path) -> Iterator[mmap.mmap | bytes]:
-    """The file's bytes, mapped so that a long log does not have to fit in memory twice.
-
-    A file that ``ros2 bag record --compression-mode file`` packed as a whole (``.zstd``) is unpacked beside it.
-
-    Raises
-    ------
-    InputError
-        if it cannot be read or unpacked.
-    """
-    try:
-        stream = path.open("rb")
-    except OSError as error:
-        raise InputError(f"cannot read the log ({error})", where=path, remedy="give a readable file") from error
-    with stream:
-        if path.suffix == ".zstd":
-            with _unpacked(stream, path) as buffer:
-                yield buffer
-        elif path.stat().st_size == 0:
-            yield b""
-        else:
-            with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
-                yield buffer
-
-
-@contextmanager
-def _unpacked(stream: BinaryIO, path: Path) -> Iterator[mmap.mmap | bytes]:
-    """Unpacked piece by piece into a file without a name, so that memory never holds it whole."""
-    most = max(chunk_limit(), MAX_RATIO * path.stat().st_size)
-    try:
-        with zstandard.ZstdDecompressor().stream_reader(stream) as reader, tempfile.TemporaryFile() as unpacked:
-            while piece := reader.read(MEBI):
-                if unpacked.tell() + len(piece) > most:
-                    raise InputError(f"the packed file holds more than {most >> 20} MiB", where=path, remedy=LARGER)
-                unpacked.write(piece)
-            unpacked.flush()
-            if unpacked.tell() == 0:
-                yield b""
-                return
-            with mmap.mmap(unpacked.fileno(), 0, access=mmap.ACCESS_READ) as buffer:
-                yield buffer
-    except (zstandard.ZstdError, MemoryError, OSError) as error:
-        raise InputError(
-            f"the packed file is broken ({error})", where=path, remedy="nothing in it can be told"
-        ) from error
-
-
 def check_magic(buffer: mmap.mmap | bytes, path: Path) -> None:
     """Refuse what is not an MCAP file at all.
 
@@ -212,209 +157,3 @@ def frames(buffer: mmap.mmap | bytes, path: Path) -> Iterator[Frame]:
 def _check_end(buffer: mmap.mmap | bytes, footer: Frame, path: Path) -> None:
     if footer.end - footer.begin != FOOTER_LENGTH or buffer[footer.end :] != MAGIC:
         raise DamageError("broken footer", path, footer.start)
-
-
-def decompress(chunk: Chunk, path: object, offset: int) -> bytes:
-    """The chunk's records, their size and CRC checked.
-
-    Raises
-    ------
-    DamageError
-        if the content does not decompress to what the chunk promises.
-    """
-    if max(chunk.uncompressed_size, len(chunk.data)) > chunk_limit():
-        large = max(chunk.uncompressed_size, len(chunk.data))
-        raise DamageError(f"a chunk of {large} bytes, more than {chunk_limit() >> 20} MiB,", path, offset, LARGER)
-    try:
-        data = _decompressed(chunk)
-    except (zstandard.ZstdError, RuntimeError, ValueError, MemoryError, EOFError) as error:
-        raise DamageError(f"a chunk does not decompress ({chunk.compression!r:.20})", path, offset) from error
-    if len(data) != chunk.uncompressed_size:
-        raise DamageError(f"a chunk holds other than the {chunk.uncompressed_size} bytes it states", path, offset)
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise DamageError("CRC error of a chunk", path, offset)
-    return data
-
-
-def _decompressed(chunk: Chunk) -> bytes:
-    # Nothing is allocated for a size that only the compressed data state, and unpacking ends one byte past the promise.
-    most = chunk.uncompressed_size + 1
-    if chunk.compression == "zstd":
-        size = zstandard.frame_content_size(chunk.data)
-        if size not in (-1, chunk.uncompressed_size):
-            raise ValueError("size")
-        if size >= 0:
-            return zstandard.ZstdDecompressor().decompress(chunk.data)
-        with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
-            return bytes(reader.read(most))
-    if chunk.compression == "lz4":
-        import lz4.frame
-
-        unpacker = lz4.frame.LZ4FrameDecompressor()
-        return bytes(unpacker.decompress(chunk.data, max_length=most))
-    if chunk.compression == "":
-        return bytes(chunk.data)
-    raise ValueError("compression")
-
-
-def read_blocks(buffer: mmap.mmap | bytes, path: Path, contents: Contents) -> Iterator[Block]:
-    """Blocks of messages in file order, strictly: the file is checked against its summary, ``contents`` is filled.
-
-    Raises
-    ------
-    DamageError
-        at the first broken record, checksum or count.
-    """
-    everything, loose = _listed(buffer, path)
-    data_end = next((i for i, f in enumerate(everything) if f.opcode == Opcode.DATA_END), len(everything) - 1)
-    data, summary = everything[:data_end], everything[data_end:]
-    check_sections(buffer, summary, contents)
-    _read_small(buffer, data, contents)
-    chunks = content = 0
-    for i, frame in enumerate(data):
-        if frame.opcode == Opcode.CHUNK:
-            chunks += 1
-            index = takewhile(lambda f: f.opcode == Opcode.MESSAGE_INDEX, islice(data, i + 1, None))
-            block = chunk_block(buffer, frame, index, contents)
-            content = check_ratio(content + len(block.data), buffer, path, frame.start)
-            yield block
-    if loose:
-        contents.unprotected = True
-        joined = b"".join(bytes(buffer[begin:end]) for begin, end in loose)
-        yield Block(joined, (), loose[0][0], len(joined))
-    _check_against_summary(contents, chunks, summary[0].start)
-
-
-def _listed(buffer: mmap.mmap | bytes, path: Path) -> tuple[list[Frame], list[tuple[int, int]]]:
-    """Records that must be looked at one by one, and the stretches of messages that stand outside of chunks."""
-    kept: list[Frame] = []
-    loose: list[tuple[int, int]] = []
-    for frame in frames(buffer, path):
-        if frame.opcode == Opcode.MESSAGE:
-            begin = loose.pop()[0] if loose and loose[-1][1] == frame.start else frame.start
-            loose.append((begin, frame.end))
-        elif frame.opcode < 0x80:
-            kept.append(frame)
-        if len(kept) > MAX_RECORDS:
-            raise DamageError(f"more than {MAX_RECORDS} records", path, frame.start)
-    return kept, loose
-
-
-def check_ratio(content: int, buffer: mmap.mmap | bytes, path: object, offset: int) -> int:
-    """Bytes unpacked so far, if a file of this size may hold them.
-
-    Raises
-    ------
-    DamageError
-        if no log is this much larger than its file.
-    """
-    if content > max(chunk_limit(), MAX_RATIO * len(buffer)):
-        raise DamageError(f"{content} bytes in a file of {len(buffer)}", path, offset, LARGER)
-    return content
-
-
-def _check_against_summary(contents: Contents, chunks: int, offset: int) -> None:
-    """What no checksum covers (records outside chunks, whole chunks skipped) must agree with the summary's copy."""
-    statistics = contents.statistics
-    if statistics is not None and statistics.chunk_count != chunks:
-        raise DamageError(f"{chunks} chunks found, the summary counts {statistics.chunk_count}", contents.path, offset)
-    for kind, ours in (("schemas", contents.schemas), ("channels", contents.channels)):
-        repeated = getattr(contents.summary, kind)
-        if any(repeated.get(identity, record) != record for identity, record in ours.items()):
-            raise DamageError(f"{kind} disagree with the summary's", contents.path, offset)
-
-
-def chunk_block(buffer: mmap.mmap | bytes, frame: Frame, index: Iterable[Frame], contents: Contents) -> Block:
-    """A chunk's content, checked.
-
-    Raises
-    ------
-    DamageError
-        if it does not parse, decompress or match its CRC.
-    """
-    chunk = parse(Chunk, bytes(buffer[frame.begin : frame.end]), contents.path, frame.start)
-    contents.unprotected |= chunk.uncompressed_crc == 0
-    bodies = tuple(bytes(buffer[after.begin : after.end]) for after in index)
-    return Block(decompress(chunk, contents.path, frame.start), bodies, frame.start, frame.end - frame.start)
-
-
-def _read_small(buffer: mmap.mmap | bytes, data: list[Frame], contents: Contents) -> None:
-    for frame in data:
-        if frame.opcode in SMALL:
-            take_record(contents, frame.opcode, bytes(buffer[frame.begin : frame.end]), frame.start)
-
-
-SMALL = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT)
-
-
-def take_record(contents: Contents, opcode: int, body: bytes, offset: int) -> None:
-    """Keep a schema, channel, metadata or attachment record.
-
-    Raises
-    ------
-    DamageError
-        if it does not parse.
-    """
-    if opcode != Opcode.ATTACHMENT and len(body) > MAX_DECLARATION:
-        raise DamageError(f"a declaration of {len(body)} bytes, more than {MAX_DECLARATION},", contents.path, offset)
-    counts = (contents.schemas, contents.channels, contents.metadata, contents.attachments)
-    if max(len(kind) for kind in counts) >= MAX_CHANNELS:
-        raise DamageError(f"more than {MAX_CHANNELS} schemas, channels or attachments", contents.path, offset)
-    if opcode == Opcode.SCHEMA:
-        schema = parse(Schema, body, contents.path, offset)
-        contents.schemas[schema.id] = schema
-    elif opcode == Opcode.CHANNEL:
-        channel = parse(Channel, body, contents.path, offset)
-        contents.channels[channel.id] = channel
-    elif opcode == Opcode.METADATA:
-        contents.metadata.append(parse(Metadata, body, contents.path, offset))
-    elif opcode == Opcode.ATTACHMENT:
-        promised = struct.unpack("<I", body[-4:].rjust(4, b"\0"))[0]
-        if promised and zlib.crc32(body[:-4]) != promised:
-            raise DamageError("CRC error of an attachment", contents.path, offset)
-        contents.attachments.append(parse(Attachment, body, contents.path, offset))
-
-
-def check_sections(buffer: mmap.mmap | bytes, summary: list[Frame], contents: Contents) -> None:
-    """CRCs of the data and summary sections; keeps the statistics.
-
-    ``summary`` is every record from the end of data (or the summary's first) to the footer.
-
-    Raises
-    ------
-    DamageError
-        if a checksum does not hold.
-    """
-    end, path = summary[0], contents.path
-    if end.opcode == Opcode.DATA_END and end.end - end.begin == 4:
-        promised = struct.unpack_from("<I", buffer, end.begin)[0]
-        if promised and zlib.crc32(memoryview(buffer)[: end.start]) != promised:
-            raise DamageError("CRC error of the data section ending", path, end.start)
-    elif end.opcode == Opcode.DATA_END:
-        raise DamageError("broken end of data", path, end.start)
-    footer = parse(Footer, bytes(buffer[summary[-1].begin : summary[-1].end]), path, summary[-1].start)
-    if footer.summary_crc:
-        begin = footer.summary_start or summary[-1].start
-        # The CRC covers the summary and the footer's own first fields: opcode, length and the two offsets.
-        if zlib.crc32(memoryview(buffer)[begin : summary[-1].end - 4]) != footer.summary_crc:
-            raise DamageError("CRC error of the summary ending", path, summary[-1].start)
-    for frame in summary:
-        body = bytes(buffer[frame.begin : frame.end])
-        if frame.opcode == Opcode.STATISTICS:
-            contents.statistics = parse(Statistics, body, path, frame.start)
-        elif frame.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-            take_record(contents.summary, frame.opcode, body, frame.start)
-
-
-def read_header(buffer: mmap.mmap | bytes, path: Path) -> Header:
-    """The header, which must be the first record.
-
-    Raises
-    ------
-    DamageError
-        if another record stands first.
-    """
-    first = next(iter(frames(buffer, path)))
-    if first.opcode != Opcode.HEADER:
-        raise DamageError("no header", path, first.start)
-    return parse(Header, bytes(buffer[first.begin : first.end]), path, first.start)

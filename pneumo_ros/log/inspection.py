@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
-from pneumo_ros.log.reading import CONFIG_TOPIC, Log
+from pneumo_ros.log.decoded import CONFIG_TOPIC, Log
 from pneumo_ros.rig import load_rig
 
 SECOND = 1e9  # ns

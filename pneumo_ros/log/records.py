@@ -17,7 +17,8 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from pneumo_ros.log.container import FRAME, Block, Contents, DamageError, take_record
+from pneumo_ros.log.container import FRAME, Block, Contents, DamageError
+from pneumo_ros.log.sections import take_record
 
 # A Message record's fixed part: opcode, length, then channel, sequence, log and publish time (MCAP specification).
 HEAD = np.dtype([

@@ -13,7 +13,7 @@ from pneumo_ros import __version__
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.log.bags import PROFILE
-from pneumo_ros.log.reading import Log
+from pneumo_ros.log.decoded import Log
 
 CHUNK_BYTES = 192 * 1024  # as the recorder's
 

@@ -20,24 +20,12 @@ from mcap.records import Footer, Header
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.bags import PROFILE, Part, files_of
-from pneumo_ros.log.container import (
-    FOOTER_LENGTH,
-    FRAME,
-    MAGIC,
-    SMALL,
-    Block,
-    Contents,
-    DamageError,
-    Frame,
-    check_ratio,
-    check_sections,
-    chunk_block,
-    mapped,
-    parse,
-    take_record,
-)
-from pneumo_ros.log.reading import Log, assemble, read_log
+from pneumo_ros.log.container import FOOTER_LENGTH, FRAME, MAGIC, Block, Contents, DamageError, Frame, parse
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import assemble, read_log
 from pneumo_ros.log.records import Gathered, gather
+from pneumo_ros.log.sections import SMALL, check_ratio, check_sections, chunk_block, take_record
+from pneumo_ros.log.unpacking import mapped
 
 # A record starts with its opcode and a length; none here is 4 GiB long, so the upper half of the length is zero.
 _START = re.compile(rb"[\x01-\x0f].{4}\x00\x00\x00\x00", re.DOTALL)
@@ -114,6 +102,8 @@ class ChunkHeader(NamedTuple):
 
 
 _CHUNK_HEAD = struct.Struct("<QQQ")
+_NAME_AT = _CHUNK_HEAD.size + 4  # of the compression's name in a chunk: behind times, size and CRC
+_NAME, _CONTENT = struct.Struct("<I"), struct.Struct("<Q")  # lengths of that name and of the content
 
 
 @dataclass
@@ -246,7 +236,7 @@ def _blocks(scan: _Scan) -> Iterator[Block]:
             if frame is None:
                 raise DamageError("broken or unfinished record", scan.contents.path, position)
             block = _take(scan, frame)
-            position = frame.end
+            position = _end(scan, frame)
         except DamageError as error:
             position = _skip(scan, frame, position, error)
             continue
@@ -275,6 +265,19 @@ def _take(scan: _Scan, frame: Frame) -> Block | None:
     elif frame.opcode == Opcode.DATA_END:
         _finish(scan, frame)
     return None
+
+
+def _end(scan: _Scan, frame: Frame) -> int:
+    """Where the next record begins. A chunk says twice how long it is: where its content is whole, that length is
+    right, and a record that claims to be longer must not swallow the chunks behind it."""
+    if frame.opcode != Opcode.CHUNK:
+        return frame.end
+    (name,) = _NAME.unpack_from(scan.buffer, frame.begin + _NAME_AT)
+    (content,) = _CONTENT.unpack_from(scan.buffer, frame.begin + _NAME_AT + _NAME.size + name)
+    end = frame.begin + _NAME_AT + _NAME.size + name + _CONTENT.size + content
+    if end != frame.end:
+        scan.notes.append(f"the length of the chunk at byte {frame.start} is wrong; its content is whole")
+    return int(end)
 
 
 def _finish(scan: _Scan, frame: Frame) -> None:

@@ -15,8 +15,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.cdr import JointEncoder
-from pneumo_ros.log.reading import Joint, Log
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.rewriting import refuse_target
+from pneumo_ros.log.topic_data import Joint
 from pneumo_ros.log.topics import DISPLACEMENT, JOINT_STATES, ROBOT_DESCRIPTION, STRING
 from pneumo_ros.log.writing import LogWriter
 from pneumo_ros.rig import Rig, load_rig

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.files import new_file
-from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, Columns, Joint, Log
+from pneumo_ros.log.decoded import FLUID_PRESSURE, JOINT_STATE, Log
+from pneumo_ros.log.topic_data import Columns, Joint
 
 Table = dict[str, NDArray[Any]]
 MERGED = (JOINT_STATE, FLUID_PRESSURE)

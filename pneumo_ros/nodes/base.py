@@ -33,7 +33,7 @@ from std_msgs.msg import String
 
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, TOPICS, Topic
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
@@ -363,8 +363,3 @@ def tell_end(node: RigNode, elapsed: float, values: Mapping[str, str] | None = N
 def node_parameters(table: Sequence[Parameter]) -> tuple[Parameter, ...]:
     """The complete parameter table of a node."""
     return (*COMMON, *table)
-
-
-def all_topics_of(name: str) -> list[Topic]:
-    """Topics of the table that a node publishes."""
-    return [topic for topic in TOPICS if topic.publisher == name]

@@ -18,8 +18,8 @@ from std_msgs.msg import String
 
 from pneumo_ros.daq.calibration import DEFAULT
 from pneumo_ros.daq.calibration_file import load_calibration
-from pneumo_ros.daq.core import Phase
 from pneumo_ros.daq.driver import BAUD, SerialDriver
+from pneumo_ros.daq.link import Phase
 from pneumo_ros.daq.reasons import Event, Level, Reason
 from pneumo_ros.daq.report import LinkReport
 from pneumo_ros.daq.safety_config import load_safety

@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import encode_clock
-from pneumo_ros.log.reading import Log
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import recorded_qos
 from pneumo_ros.nodes.spin import SPIN_TIMEOUT

@@ -113,7 +113,9 @@ class OwnExperiment:
 def design_own(problem: Problem, best: Fit, rival: Fit) -> OwnExperiment | None:
     """The course that separates two fitted structures most; None where no input is marked ``drive``."""
     model, log = problem.model, problem.records[-1]
-    if not isinstance(model, OwnRig) or not any(spec.drive for spec in model.description.inputs.values()):
+    if not isinstance(model, OwnRig) or not isinstance(log, OwnRecord):
+        return None
+    if not any(spec.drive for spec in model.description.inputs.values()):
         return None
     tried = [(separation(problem, best, rival, record), name, says, record)
              for name, says, record in courses(model, log)]  # fmt: skip

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.result import Diagnosis
-from pneumo_ros.diagnosis.search.competition import Progress
+from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.own_rig.description import Description, read_description
 from pneumo_ros.own_rig.model import OwnRig, own_rig

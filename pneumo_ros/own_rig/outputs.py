@@ -12,25 +12,21 @@ import yaml
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.report.card import RigCard
-from pneumo_ros.diagnosis.report.contents import Findings, told
-from pneumo_ros.diagnosis.report.outputs import FILES, claim_folder
-from pneumo_ros.diagnosis.report.page import write_report
+from pneumo_ros.diagnosis.report.contents import Findings
+from pneumo_ros.diagnosis.report.outputs import write_files
 from pneumo_ros.diagnosis.report.quantities import readable
+from pneumo_ros.diagnosis.report.residual_log import PREFIXES, new_residual_log, tables_of, write_joints
 from pneumo_ros.diagnosis.report.steps import Asked
 from pneumo_ros.diagnosis.report.story import Story
-from pneumo_ros.diagnosis.result import Diagnosis, write_json
+from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import is_law
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
-from pneumo_ros.log.cdr import JointEncoder
-from pneumo_ros.log.topics import JOINT
-from pneumo_ros.log.writing import LogWriter
 from pneumo_ros.own_rig.model import OwnRig
 from pneumo_ros.own_rig.picture import picture_of
 from pneumo_ros.own_rig.quantities import UNITS
 from pneumo_ros.own_rig.records import OwnRecord
 
-PREFIXES = {"nominal": "/nominal", "refit": "/refit", "best": "/corrected"}
 DIGITS = 12  # of a saved number: the saved rig is the fitted one to 1e-9
 
 
@@ -47,18 +43,7 @@ def write_outputs(
     holdout: OwnRecord,
     asked: Asked | None = None,
 ) -> tuple[list[Path], Story]:
-    """Write report.html, residual.mcap and, last, diagnosis.json; older ones of the same names are replaced.
-
-    Returns
-    -------
-    The files, and what the report says first.
-
-    Raises
-    ------
-    InputError
-        if the folder cannot be made or written.
-    """
-    claim_folder(folder)
+    """Write all files of a diagnosis, see :func:`pneumo_ros.diagnosis.report.outputs.write_files`."""
     runs = {name: run for name, run in found.trajectories.items() if name in PREFIXES}
     findings = Findings(
         summary=summary_of(found),
@@ -70,10 +55,7 @@ def write_outputs(
         asked=asked,
         card=card_of(model, holdout),
     )
-    write_report(folder / FILES[1], findings)
-    write_residuals(folder / FILES[2], model, holdout, runs)
-    write_json(found, folder / FILES[0])
-    return [folder / name for name in FILES], told(findings)
+    return write_files(folder, found, findings, lambda path: write_residuals(path, model, holdout, runs))
 
 
 def card_of(model: OwnRig, record: OwnRecord) -> RigCard:
@@ -87,22 +69,10 @@ def card_of(model: OwnRig, record: OwnRecord) -> RigCard:
 
 def write_residuals(path: Path, model: OwnRig, holdout: OwnRecord, runs: Mapping[str, Array]) -> None:
     """The held-out log beside the free runs, each a JointState by channel: ``/measured/channels``, ``/nominal/...``."""
-    path.unlink(missing_ok=True)
     stamps = np.round(holdout.time * 1e9).astype(np.int64)
-    measured = np.where(holdout.weight > 0.0, holdout.measured, np.nan)
-    tables = {"/measured": measured} | {PREFIXES[name]: run for name, run in runs.items()}
-    if "best" in runs:
-        tables["/residual"] = measured - runs["best"]
-    writer = LogWriter(path, {"diagnosis": {"log": holdout.name, "rig": model.description.name}}, bag_folder=False)
-    complete = False
-    try:
-        for prefix, table in tables.items():
-            channel, encoder = writer.add_topic(f"{prefix}/channels", JOINT), JointEncoder("rig", model.channels)
-            for stamp, row in zip(stamps.tolist(), table.tolist(), strict=True):
-                writer.write(channel, encoder.encode(stamp, row), stamp)
-        complete = True
-    finally:
-        writer.finish(complete, "" if complete else "the diagnosis was interrupted")
+    with new_residual_log(path, {"log": holdout.name, "rig": model.description.name}) as writer:
+        for prefix, table in tables_of(holdout, runs).items():
+            write_joints(writer, f"{prefix}/channels", "rig", model.channels, stamps, table)
 
 
 def save_rig(found: Diagnosis, model: OwnRig, path: Path) -> Path:

@@ -3,6 +3,13 @@
 
 Effective area: Table 5.2 continued to 100 psig with Table 4.1's trend; volume: least squares of Table 4.1 (errata 6);
 gas: Eq. 4.22. Gauge pressure makes force, absolute pressure makes gas (errata 7).
+
+Kernel arguments
+----------------
+height : of the spring, m
+cubics, column, segment, t : piecewise cubics of the surface, which pressure and which height interval, m into it
+area : opening, m2
+pressure, power : absolute, Pa, and :func:`pressure_power` of it
 """
 
 from __future__ import annotations

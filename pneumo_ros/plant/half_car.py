@@ -6,6 +6,19 @@ their rates, front and rear spring pressure [Pa absolute]. All z are upwards fro
 nose up.
 Inputs: commanded orifice areas (front inlet, rear inlet, front outlet, rear outlet) [m2], held over a period, and road
 height (front, rear) [m], linear over a period.
+
+Kernel arguments
+----------------
+x, x0, state : (10,): heave, pitch, two axle heights, their rates, two absolute pressures; m, rad, m/s, rad/s, Pa
+a, b, c, d, k : rates of the state
+dt, period, steps : a step, s; a control period, s, and the RK4 steps in it
+height, height_rate : of a spring, m and m/s, extension positive
+pressure, ambient : absolute, Pa
+scale, damping : factor on the effective area, 1; of the bushing, N s/m
+inlet_front, inlet_rear, outlet_front, outlet_rear : openings, m2; command, commands : the four, (4,), (N, 4)
+road_front, road_rear : heights of the ground, m; road : both at the ends of each period
+p, packed, start : numbers of :attr:`HalfCar.packed`, and where a spring's begin
+heights, pressures, cubics : fields of :class:`~pneumo_ros.plant.air_spring.AreaSurface`
 """
 
 from __future__ import annotations
@@ -167,8 +180,8 @@ def accelerations(
     spring_rear: float,
     tyre_front: float,
     tyre_rear: float,
-    lift: float,
-    turn: float,
+    extra_force: float,
+    extra_moment: float,
     body: Body,
 ) -> tuple[float, float, float, float]:
     """Newton's law for body and axles (Eqs. 4.63-4.66): heave, m/s2, pitch, rad/s2, front and rear axle, m/s2.
@@ -177,12 +190,12 @@ def accelerations(
     ----------
     spring_front, spring_rear : N, positive upwards on the body
     tyre_front, tyre_rear : N, positive upwards on the axle
-    lift, turn : what else acts on the body, N and N m nose up
+    extra_force, extra_moment : what else acts on the body, N and N m nose up
     body : masses and arms
     """
     return (
-        (spring_front + spring_rear + lift) / body.sprung_mass - GRAVITY,
-        (body.front_arm * spring_front - body.rear_arm * spring_rear + turn) / body.pitch_inertia,
+        (spring_front + spring_rear + extra_force) / body.sprung_mass - GRAVITY,
+        (body.front_arm * spring_front - body.rear_arm * spring_rear + extra_moment) / body.pitch_inertia,
         (tyre_front - spring_front) / body.unsprung_mass_front - GRAVITY,
         (tyre_rear - spring_rear) / body.unsprung_mass_rear - GRAVITY,
     )

@@ -26,7 +26,8 @@ def critical_ratio(n: float) -> float:
 
 @njit(cache=True)
 def flow_function(ratio: float, n: float) -> float:
-    """Dimensionless sqrt(2n/(n-1) (r^(2/n) - r^((n+1)/n))) of Eq. 4.7 at an unclamped ``ratio`` in (0, 1].
+    """Dimensionless sqrt(2n/(n-1) (r^(2/n) - r^((n+1)/n))) of Eq. 4.7 at an unclamped ``ratio`` in (0, 1]; ``n`` is the
+    polytropic exponent.
 
     Written with expm1 of the logarithm, so that n -> 1 is smooth and small pressure drops keep their digits.
     """

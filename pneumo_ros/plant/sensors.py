@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the rig's sensors read and what a simulation knows beyond them."""
+"""What the rig's sensors read and what a simulation knows beyond them.
+
+Kernel arguments
+----------------
+x, u, road : state (10,), openings (4,), m2, and ground (2,), m
+packed, heights, pressures, cubics : the half car as numbers, see :mod:`pneumo_ros.plant.half_car`
+"""
 
 from __future__ import annotations
 

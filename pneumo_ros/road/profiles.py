@@ -3,6 +3,11 @@
 
 Heights are the road's under the scaled rig, m, upwards; a full-scale road at full-scale speed is divided by the length
 scale (time scale 1, section 6.2). The rear axle meets what the front axle met, wheelbase/speed later (errata 2).
+
+Kernel arguments
+----------------
+t : (N,) s
+w, a, p : (K,) frequencies, rad/s, amplitudes, m, and phases, rad, of the cosines
 """
 
 from __future__ import annotations

@@ -22,9 +22,10 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import PARAMETERS as ESTIMATION_PARAMETERS
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointEncoder
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import Setup, read_setups
-from pneumo_ros.log.reading import Log, TopicInfo
 from pneumo_ros.log.records import Records
+from pneumo_ros.log.topic_data import TopicInfo
 from pneumo_ros.log.topics import Topic
 from pneumo_ros.log.writing import interface
 from pneumo_ros.parameters import Parameter, Value, settings

@@ -20,8 +20,8 @@ from pneumo_ros.control.loop import close_loop
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.log import topics
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import read_setups, seed_of
-from pneumo_ros.log.reading import Log
 from pneumo_ros.plant.stepping import SteppedRig, plain_rig
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.printable import printable

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import read_setups
-from pneumo_ros.log.reading import Joint, Log, read_log
+from pneumo_ros.log.reading import read_log
+from pneumo_ros.log.topic_data import Joint
 from pneumo_ros.ride.comfort import Ride, judge
 from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import (

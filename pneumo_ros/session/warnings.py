@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import read_events
-from pneumo_ros.log.reading import Log
 
 MISSED = "missed periods"
 STALE, TRIPPED = "estimate_stale", 2

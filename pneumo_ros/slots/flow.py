@@ -3,6 +3,13 @@
 
 ``c`` are the coordinates (pressure or level up, down, nominal flow). A gas chokes: its flow through a hole goes with
 the upper pressure alone below the critical ratio (ISO 6358); through a long gap it goes with the difference of squares.
+
+Kernel arguments
+----------------
+c, z, P, S : coordinates (3,), memories (MEMORIES,), values of all laws and atoms (VALUES,), scales (SCALES,)
+up, down, scale : pressures or levels on both sides, and the one that a gas's gap is stated at, in the slot's unit
+gas : whether it chokes; a liquid does not
+h, since : a step, and time since the log began, s
 """
 
 from __future__ import annotations

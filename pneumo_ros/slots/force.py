@@ -4,6 +4,13 @@
 ``c`` are the coordinates (travel, rate, load), ``z`` the memories, ``P`` the values of all laws and atoms (0: absent;
 the columns are named here), ``S`` the slot's scales. What opposes a motion is negative at positive rate. Memories move
 once a step by what the travel has moved, as exact as a step is short.
+
+Kernel arguments
+----------------
+c, z, P, S : coordinates (3,), memories (MEMORIES,), values of all laws and atoms (VALUES,), scales (SCALES,)
+x, v, load : the coordinates: travel, its rate, and what presses, in the slot's units
+h : a step, s
+value, limit : any unit
 """
 
 from __future__ import annotations

@@ -3,6 +3,10 @@
 
 ``P`` are the values of all laws and atoms (0: absent), in the signal's unit, seconds or shares; ``S`` its scales. Whole
 logs pass at once: first what the value alone decides, then what takes time.
+
+Kernel arguments
+----------------
+u, half : (N,) signal, and half the width of its play, in one unit
 """
 
 from __future__ import annotations

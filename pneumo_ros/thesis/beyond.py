@@ -10,11 +10,11 @@ import numpy as np
 from pneumo_ros.rig import LIMITS
 from pneumo_ros.road import iso_psd
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, nominal
 from pneumo_ros.thesis.report import Chapter, Claim, Step, Table, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import KMH
+from pneumo_ros.workers import run_in_order
 
 STEPS = 3
 SIGMAS = 3.0  # how far the true rig is off, in the tolerances of rig.yaml
@@ -34,7 +34,7 @@ WANTED = 0.30  # share by which heave rms is to fall against the thesis's contro
 def build(settings: ThesisSettings, step: Step) -> Chapter:
     """The comparison and what bounds it."""
     step("area rate feedforward and two valves")
-    o = dict(zip(RUNS, run_all(measure, [(settings, e) for e in RUNS.values()]), strict=True))
+    o = dict(zip(RUNS, run_in_order(measure, [(settings, e) for e in RUNS.values()]), strict=True))
     lead = (
         "The thesis takes dA/dt as zero and commands the inlets alone. With the 2M2A's surface known, the estimator "
         "finds "
@@ -64,7 +64,7 @@ def _share_table(settings: ThesisSettings) -> Table:
         for name in names
         for share in SHARES
     ]
-    o = run_all(measure, [(settings, e) for e in runs])
+    o = run_in_order(measure, [(settings, e) for e in runs])
     rows = []
     for i, name in enumerate(names):
         part = o[i * len(SHARES) : (i + 1) * len(SHARES)]
@@ -93,7 +93,7 @@ def perturbations() -> dict[str, dict[str, float]]:
 def _off_table(settings: ThesisSettings) -> Table:
     names, cases = ("passive", "thesis", "default", "two_valve"), {"nominal": {}, **perturbations()}
     runs = [HalfExperiment(n, {}, VOLUME, False, HEIGHT_ERROR_IN, off=case) for case in cases.values() for n in names]
-    o = run_all(measure, [(settings, e) for e in runs])
+    o = run_in_order(measure, [(settings, e) for e in runs])
     rows = [
         [case, *[f"{x.heave_rms:.3f}" for x in o[i * len(names) : (i + 1) * len(names)]]]
         for i, case in enumerate(cases)

@@ -8,10 +8,10 @@ import numpy as np
 from pneumo_ros.road import LENGTH_SCALE
 from pneumo_ros.thesis.chapter6_half import HEIGHT_ERROR_IN, VOLUME, table
 from pneumo_ros.thesis.comfort_limits import HEALEY, ISO_1972_HOURS, iso_1972_limit, third_octaves
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import CONVENTIONAL, HalfExperiment, heave_of, measure
 from pneumo_ros.thesis.report import Chapter, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
+from pneumo_ros.workers import run_in_order
 
 STEPS = 2
 RUNS: dict[str, HalfExperiment] = {
@@ -25,7 +25,7 @@ RUNS: dict[str, HalfExperiment] = {
 def build(settings: ThesisSettings, step: Step) -> Chapter:
     """The chapter's table, picture and claims."""
     step("passive, skyhook and active rides")
-    o = dict(zip(RUNS, run_all(measure, [(settings, e) for e in RUNS.values()]), strict=True))
+    o = dict(zip(RUNS, run_in_order(measure, [(settings, e) for e in RUNS.values()]), strict=True))
     step("one-third-octave spectra")
     passive, sky = o["conventional passive"], o["conventional skyhook"]
     jerk = iso_1972_limit(2.0) * 2.0 / (iso_1972_limit(1.0) * 1.0)

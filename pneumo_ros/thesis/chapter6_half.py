@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig.channels import PITCH
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.half import HalfExperiment, HalfOutcome, measure, run
 from pneumo_ros.thesis.report import Claim, Picture, Step, Table, canvas, verdict
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import DEGREE, INCH, SQUARE_INCH
+from pneumo_ros.workers import run_in_order
 
 STEPS = 2
 VOLUME: dict[str, Value] = {"volume_estimate_in3": 4.0}  # Section 6.7.5
@@ -35,7 +35,7 @@ def build_half(settings: ThesisSettings, step: Step) -> tuple[list[Claim], list[
     """Claims, tables and pictures of Section 6.7."""
     step("half car: controllers and estimator")
     runs = experiments(settings)
-    outcomes = dict(zip(runs, run_all(measure, [(settings, e) for e in runs.values()]), strict=True))
+    outcomes = dict(zip(runs, run_in_order(measure, [(settings, e) for e in runs.values()]), strict=True))
     step("half car: time histories")
     return claims(outcomes), [table("Half car, class D road", outcomes)], [_picture(settings, runs["thesis, exact"])]
 

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, run
 from pneumo_ros.thesis.quarter_experiments import AREAS_IN2, CURVES, ESTIMATED, EXPERIMENTS, K2000, POLES
 from pneumo_ros.thesis.quarter_pictures import (
@@ -22,6 +21,7 @@ from pneumo_ros.thesis.quarter_pictures import (
 from pneumo_ros.thesis.report import Claim, Picture, Step, Table, verdict
 from pneumo_ros.thesis.robustness import SLIDING, robustness_table
 from pneumo_ros.thesis.settings import ThesisSettings
+from pneumo_ros.workers import run_in_order
 
 STEPS = 4
 RESONANCE = (
@@ -35,7 +35,7 @@ Outcomes = Mapping[str, Outcome]
 def build_quarter(settings: ThesisSettings, step: Step) -> tuple[list[Claim], list[Table], list[Picture]]:
     """Claims, tables and pictures of Sections 6.3 to 6.6."""
     step("quarter car: controllers and estimators")
-    results = run_all(measure, [(settings, e) for e in EXPERIMENTS.values()])
+    results = run_in_order(measure, [(settings, e) for e in EXPERIMENTS.values()])
     outcomes = dict(zip(EXPERIMENTS, results, strict=True))
     step("quarter car: sensitivity curves")
     curves = sensitivity(settings)
@@ -75,7 +75,7 @@ def sensitivity(settings: ThesisSettings) -> dict[str, np.ndarray]:
         for pole in POLES
     ]
     jobs += [(settings, Experiment("first_order_smflc", False, {**K2000, "pole": pole})) for pole in POLES]
-    values = np.array([o.rms_g for o in run_all(measure, jobs)])
+    values = np.array([o.rms_g for o in run_in_order(measure, jobs)])
     size = len(AREAS_IN2) * len(POLES)
     grids = {name: values[i * size : (i + 1) * size].reshape(len(AREAS_IN2), -1) for i, name in enumerate(CURVES)}
     return {**grids, ESTIMATED: values[len(CURVES) * size :].reshape(1, -1)}

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from pneumo_ros.control.laws.family import LAWS
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.linearised import area_stiffness_share, body_mode
 from pneumo_ros.thesis.quarter import Experiment, Outcome, measure, plant, run
 from pneumo_ros.thesis.quarter_experiments import AREAS_IN2, EXPERIMENTS, PAIRS, POLES
@@ -16,6 +15,7 @@ from pneumo_ros.thesis.report import Picture, Table, canvas
 from pneumo_ros.thesis.robustness import SLIDING
 from pneumo_ros.thesis.settings import ThesisSettings
 from pneumo_ros.units import INCH, SQUARE_INCH
+from pneumo_ros.workers import run_in_order
 
 Outcomes = Mapping[str, Outcome]
 MPR_NOTE = (
@@ -27,7 +27,7 @@ def cylinder_table(settings: ThesisSettings) -> Table:
     """Every law on the cylinder of Section 6.3, its area and volume known: what is left is not dA/dt."""
     runs = {"passive": Experiment("passive", True)}
     runs |= {law: Experiment(law, True, {"area_in2": 5.0}) for law in LAWS}
-    outcomes = run_all(measure, [(settings, e) for e in runs.values()])
+    outcomes = run_in_order(measure, [(settings, e) for e in runs.values()])
     return outcome_table("Quarter car on a cylinder of 5 in2, area known", dict(zip(runs, outcomes, strict=True)))
 
 

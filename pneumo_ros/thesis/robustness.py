@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from pneumo_ros.thesis.ensemble import run_all
 from pneumo_ros.thesis.quarter import Experiment, Outcome, measure
 from pneumo_ros.thesis.report import Table
 from pneumo_ros.thesis.settings import ThesisSettings
+from pneumo_ros.workers import run_in_order
 
 SEEDS = 2
 VARIATIONS: dict[str, dict[str, float | str]] = {
@@ -53,7 +53,7 @@ def _most(o: Outcomes, key: str) -> str:
 def robustness_table(settings: ThesisSettings, experiments: Mapping[str, Experiment]) -> Table:
     """Yes or no for each ordering under each variation."""
     varied = [replace(settings, seeds=SEEDS, **changes) for changes in VARIATIONS.values()]  # type: ignore[arg-type]
-    results = run_all(measure, [(s, e) for s in varied for e in experiments.values()])
+    results = run_in_order(measure, [(s, e) for s in varied for e in experiments.values()])
     size = len(experiments)
     columns = [dict(zip(experiments, results[i * size : (i + 1) * size], strict=True)) for i in range(len(varied))]
     rows = []

@@ -17,14 +17,15 @@ from hypothesis import strategies as st
 
 from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.daq.calibration_file import load_calibration
-from pneumo_ros.daq.core import DriverCore, Phase
+from pneumo_ros.daq.core import DriverCore
 from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.emulator.device import Device
 from pneumo_ros.daq.frames import DeviceState, OutputRange, encode
 from pneumo_ros.daq.intake import Measurement
-from pneumo_ros.daq.limits import MEASURED, LimitMonitor
+from pneumo_ros.daq.limits import LimitMonitor
+from pneumo_ros.daq.link import Phase
 from pneumo_ros.daq.reasons import Reason
-from pneumo_ros.daq.safety_config import Limit, load_safety
+from pneumo_ros.daq.safety_config import MEASURED, Limit, load_safety
 
 
 def test_handshake_arming_and_a_bumpless_start() -> None:

@@ -21,7 +21,7 @@ from helpers.folders import ROOT
 from helpers.serial_rig import Loop, SerialRig, Truth
 
 from pneumo_ros.daq.actuation import Mode
-from pneumo_ros.daq.core import Phase
+from pneumo_ros.daq.link import Phase
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.daq.reasons import Level, Reason
 from pneumo_ros.errors import InputError

@@ -24,8 +24,9 @@ from pneumo_ros.diagnosis.signals import Signals, check_pair
 from pneumo_ros.effects import library
 from pneumo_ros.effects.corrected_rig import CorrectedRig, diagnosed_rig
 from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.nuisance import COMMAND_DELAY
 from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import COMMAND_DELAY, RigModel
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.errors import InputError, PneumoError
 from pneumo_ros.log.reading import read_log

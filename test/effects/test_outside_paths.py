@@ -22,7 +22,8 @@ from pneumo_ros.effects.cache import cache_folder, kept
 from pneumo_ros.effects.configured import configured_effects, library_of, with_files
 from pneumo_ros.effects.loading import load_library, origin_of, origins
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.reading import STRING, read_log
+from pneumo_ros.log.decoded import STRING
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import NamedEffect, load_rig, parse_rig
 from pneumo_ros.session.replay import replay
 

@@ -17,7 +17,7 @@ import zstandard
 
 from helpers.hostile import rest_log
 from helpers.small_logs import text, write
-from pneumo_ros.log.reading import STRING
+from pneumo_ros.log.decoded import STRING
 from pneumo_ros.rig import load_rig
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -20,7 +20,7 @@ import zstandard
 
 from helpers.hostile import RIG, rest_log
 from helpers.small_logs import text
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.dashboard.source import Playback
@@ -28,8 +28,9 @@ from pneumo_ros.diagnosis.signals import read_signals
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.log.comparison import compare
 from pneumo_ros.log.conformance import check_conformance
+from pneumo_ros.log.decoded import STRING, Log
 from pneumo_ros.log.inspection import inspect_log
-from pneumo_ros.log.reading import STRING, Log, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.repair import recover
 from pneumo_ros.log.tables import export
 from pneumo_ros.paths import share_file

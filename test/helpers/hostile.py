@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from helpers.small_logs import STORE, Message, header, joint, pressure, text, write
-from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, STRING
+from pneumo_ros.log.decoded import FLUID_PRESSURE, JOINT_STATE, STRING
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 

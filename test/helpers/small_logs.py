@@ -15,7 +15,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
 
-from pneumo_ros.log.reading import FLUID_PRESSURE, JOINT_STATE, STRING, Log, read_log
+from pneumo_ros.log.decoded import FLUID_PRESSURE, JOINT_STATE, STRING, Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import load_rig
 
 PERIOD = 2_000_000  # ns

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from helpers.small_logs import STORE, joint
 
+from pneumo_ros.log.decoded import JOINT_STATE
 from pneumo_ros.log.inspection import inspect_log
-from pneumo_ros.log.reading import JOINT_STATE, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.salvage import salvage
 from pneumo_ros.log.writing import LogWriter, Written
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zstandard
+from helpers.practice import OTHER_WRITER
 from helpers.small_logs import (
     STORE,
     Message,
@@ -23,8 +24,9 @@ from helpers.small_logs import (
 from mcap.writer import CompressionType, IndexType
 
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.decoded import JOINT_STATE, STRING, Log
 from pneumo_ros.log.layouts import layout_of
-from pneumo_ros.log.reading import JOINT_STATE, STRING, Log, read_log
+from pneumo_ros.log.reading import read_log
 
 
 @pytest.mark.parametrize(
@@ -48,15 +50,14 @@ def test_any_container_reads_the_same(tmp_path: Path, options: dict[str, object]
     assert log.unprotected == unprotected
 
 
-def test_sample_log_reads_as_mcap_ros2_reads_it(shared: Path) -> None:
-    path = shared / "logs" / "practice" / "leak-front-fit.mcap"
-    log = read_log(path)
-    assert_equals_mcap_ros2(path, log)
+def test_sample_log_reads_as_mcap_ros2_reads_it() -> None:
+    log = read_log(OTHER_WRITER)
+    assert_equals_mcap_ros2(OTHER_WRITER, log)
     assert log.config is not None and log.config.name == "half-car-2m2a"
 
 
-def test_the_sample_log_takes_the_bulk_way(shared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    log = read_log(shared / "logs" / "practice" / "leak-front-fit.mcap")
+def test_the_sample_log_takes_the_bulk_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = read_log(OTHER_WRITER)
     monkeypatch.setattr(Log, "_decode_slowly", lambda *_: pytest.fail("decoded one by one"))
     for topic, info in log.topics.items():
         if info.type != STRING:

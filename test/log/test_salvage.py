@@ -11,7 +11,8 @@ import pytest
 from helpers.small_logs import session, write
 
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.repair import recover
 from pneumo_ros.log.salvage import salvage
 

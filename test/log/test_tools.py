@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from helpers.practice import OTHER_WRITER, labels
 from helpers.small_logs import (
     NAMES,
     PERIOD,
@@ -30,8 +31,9 @@ from pneumo_ros.cli.log import app
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import compare
 from pneumo_ros.log.conformance import breaks_contract, check_conformance
+from pneumo_ros.log.decoded import STRING
 from pneumo_ros.log.inspection import inspect_log
-from pneumo_ros.log.reading import STRING, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.repair import recover
 from pneumo_ros.log.tables import export
 from pneumo_ros.rig import load_rig
@@ -63,8 +65,9 @@ def test_a_good_log_keeps_the_contract(tmp_path: Path) -> None:
     assert result.exit_code == 0 and "0 error, 0 warning" in result.output
 
 
-def test_the_sample_logs_keep_the_contract(shared: Path) -> None:
-    for path in sorted((shared / "logs" / "practice").glob("*.mcap")):
+def test_the_practice_logs_keep_the_contract(practice: Callable[[str], Path]) -> None:
+    paths = [OTHER_WRITER, *(practice(f"{label['name']}-{part}") for label in labels() for part in ("fit", "holdout"))]
+    for path in paths:
         assert not breaks_contract(check_conformance(read_log(path))), path.name
 
 

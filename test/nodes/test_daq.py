@@ -35,7 +35,8 @@ from pneumo_ros.daq.calibration import SENSORS
 from pneumo_ros.daq.calibration_file import parse_calibration
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.controller import ControllerNode
 
 RATE = 250  # Hz; five processes of a session and the emulator share the cores with everything else

@@ -23,7 +23,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from pneumo_ros.cli.run import node_tables
+from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.errors import InputError
 from pneumo_ros.nodes.estimator import EstimatorNode
 from pneumo_ros.nodes.session_recorder import SessionRecorderNode

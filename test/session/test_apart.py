@@ -19,7 +19,8 @@ from rclpy.context import Context
 from sensor_msgs.msg import JointState
 
 from pneumo_ros.log import topics
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.neighbours import LOOK_FOR, neighbours
 from pneumo_ros.session.claim import Claim
 

@@ -17,7 +17,8 @@ from pneumo_ros.cli.tables import summary_table, timing_table
 from pneumo_ros.control.half_car import build_controller
 from pneumo_ros.control.loop import close_loop
 from pneumo_ros.estimation.half_car import build_estimator
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.topics import DIAGNOSTICS
 from pneumo_ros.plant.sensors import truth
 from pneumo_ros.plant.trim import nominal_half_car

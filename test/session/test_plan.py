@@ -118,7 +118,7 @@ def test_a_node_refuses_a_bad_parameter_on_its_own(node: str) -> None:
 
 
 def test_every_preset_is_made_of_parameters_the_nodes_have() -> None:
-    from pneumo_ros.cli.run import node_tables
+    from pneumo_ros.cli.session_plan import node_tables
     from pneumo_ros.control.presets import PRESETS, controller_settings
     from pneumo_ros.session.plan import assign
 

@@ -23,7 +23,8 @@ from pneumo_ros.cli.replay import app
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.comparison import same_payload
-from pneumo_ros.log.reading import Log, read_log
+from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.records import Records
 from pneumo_ros.log.rewriting import write_log
 from pneumo_ros.session.replay import replay

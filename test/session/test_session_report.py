@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.log import app
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.reading import STRING, read_log
+from pneumo_ros.log.decoded import STRING
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import load_rig
 from pneumo_ros.session.report import write_report
 

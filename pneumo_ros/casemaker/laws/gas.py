@@ -1,5 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Second laws of the air: leak, heat, volume, orifice, supply. Flows in kg/s, pressures absolute in Pa."""
+"""Second laws of the air: leak, heat, volume, orifice, supply. Flows in kg/s, pressures absolute in Pa.
+
+Kernel arguments
+----------------
+p : (COLUMNS,) the law's row: its number, then its parameters in the order that the law states
+x, dx : state and its rate, which is written; wall, memory : which of them is the law's own
+pressure, chamber, ambient, source, tank : absolute, Pa
+temperature, gas, outside : K
+inflow, flow : kg/s
+opening, volume : m2, m3
+squeeze, speed : work rate P dV/dt, W, and speed of the strut, m/s
+exponent : polytropic exponent, 1
+ratio, critical : downstream over upstream pressure, and the one at which the flow chokes, 1
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Second laws of valve, tyre, exciter and sensors, and what no family explains: pulses, winds, swinging loads."""
+"""Second laws of valve, tyre, exciter and sensors, and what no family explains: pulses, winds, swinging loads.
+
+Kernel arguments
+----------------
+p : (COLUMNS,) the law's row: its number, then its parameters in the order that the law states
+x, dx, at : state, its rate, which is written, and the place of the law's own in them
+target, value : what is followed and what follows, in one unit
+spool : position of the inlet's spool, m2
+time, period : s
+rate, load, ratio : see the law
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,15 @@
 """Second laws of what acts between body and axle: friction, hysteresis, damping, mode, stop, area.
 
 Forces push body and axle apart when positive; ``p`` is a row of :mod:`pneumo_ros.casemaker.laws.slots`.
+
+Kernel arguments
+----------------
+p : (COLUMNS,) the law's row: its number, then its parameters in the order that the law states
+x, dx, at, sliders : state, its rate, which is written, and the places of the law's own in them
+z : the friction's memory, in units of its level (of a slider: m)
+height, speed : of the strut, m and m/s, extension positive
+top, axle : heights of body and axle at this end, m
+spring : force of the spring, N
 """
 
 from __future__ import annotations

@@ -3,6 +3,11 @@
 
 The sliding laws take a surface S of Eqs. 6.24-6.25 and make S^2/2 fall (Eqs. 6.26-6.30): the wanted third derivative is
 what puts S' = -K_s sat(S) (Eqs. 6.34-6.39).
+
+Kernel arguments
+----------------
+surface, layer : sliding variable and half thickness of the boundary layer, in one unit
+pole : lambda, 1/s
 """
 
 from __future__ import annotations

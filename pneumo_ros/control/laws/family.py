@@ -66,7 +66,7 @@ def first_order_smflc(error: Error, gains: Gains) -> tuple[float, float]:
 
 @njit(cache=True)
 def wanted_jerk(law: int, error: Error, gains: Gains) -> tuple[float, float]:
-    """Third derivative wanted of an output and its sliding variable, by law index into :data:`LAWS`."""
+    """Third derivative wanted of an output and its sliding variable, by ``law``, an index into :data:`LAWS`."""
     if law == FIRST_ORDER_SMFLC:
         return first_order_smflc(error, gains)
     if law == THIRD_ORDER_SMFLC:

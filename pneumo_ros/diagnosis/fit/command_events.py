@@ -11,20 +11,24 @@ they hold.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
 
-PRIOR_STD = 0.5  # samples: a lead costs something, so that jumps nothing depends on stay where the log has them
-# The mean square must fall below this share, or the log's own times are kept: jumps that really came earlier make most
-# of what a right structure leaves, while a wrong one can always hide some of its error behind them.
-WORTH = 0.6
-TOO_COARSE = 400.0  # mean square in sigmas above which the structure is too wrong to time anything by it
-MOST_EVENTS = 600
+# prior sigma of a lead, samples: a lead costs something, so that jumps nothing depends on stay where the log has them
+# [taste]
+PRIOR_STD: Final = 0.5
+# The mean square must fall below this share, or the log's own times are kept: jumps that really came earlier make
+# most of what a right structure leaves, while a wrong one can always hide some of its error behind them [taste]
+WORTH: Final = 0.6
+# Mean square, sigma squared, above which the structure is too wrong to time anything by it [taste]
+TOO_COARSE: Final = 400.0
+MOST_EVENTS: Final = 600  # jumps in all logs, one simulation each: more are not timed [numerics]
 
 
 @runtime_checkable

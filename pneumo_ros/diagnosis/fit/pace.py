@@ -10,20 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.traits import HasPace
 
-FEWEST_BLOCKS, MOST_BLOCKS = 9, 48  # of a whole record: three turns of three; blocks shorter than that tell no more
-PERIODS = 1.5  # of the slowest motion in a block, where the record is long enough
-FASTEST = 0.99  # share of a channel's power below its bandwidth
-SAMPLES = 20.0  # fit samples in the period of the fastest motion
-FEWEST_FREE = 30.0  # samples that a record is worth, however smooth: what is left of it need not be
-FEWEST_SAMPLES = 240  # fit samples of a record that averaging leaves
-SHORTEST_SETTLE, SETTLED = 8, 0.25  # rows; periods of the slowest motion
-LONGEST_SETTLE = 0.1  # of the record
+FEWEST_BLOCKS: Final = 9  # blocks of a whole record at least: three folds of three [numerics]
+MOST_BLOCKS: Final = 48  # blocks of a whole record at most: shorter ones tell no more [taste]
+PERIODS: Final = 1.5  # of the slowest motion in a block, where the record is long enough [taste]
+FASTEST: Final = 0.99  # share of a channel's power below its bandwidth [taste]
+SAMPLES: Final = 20.0  # fit samples in the period of the fastest motion [numerics]
+FEWEST_FREE: Final = 30.0  # samples that a record is worth, however smooth: what is left of it need not be [taste]
+FEWEST_SAMPLES: Final = 240  # fit samples of a record that averaging leaves [numerics]
+SHORTEST_SETTLE: Final = 8  # rows from which the initial state is refined, at least [numerics]
+SETTLED: Final = 0.25  # periods of the slowest motion from which the initial state is refined [taste]
+LONGEST_SETTLE: Final = 0.1  # share of the record from which the initial state is refined, at most [taste]
 
 
 @dataclass(frozen=True)
@@ -48,13 +52,12 @@ class Pace:
     period: float = 0.5
 
 
-HALF_CAR = Pace()
+HALF_CAR: Final = Pace()  # lengths of the half car: body at about 2 Hz, wheel hop at 9 Hz, logs at 500 Hz [physics]
 
 
-def pace_of(record: Any) -> Pace:
+def pace_of(record: Record) -> Pace:
     """A record's own pace, or the half car's."""
-    found = getattr(record, "pace", None)
-    return found if isinstance(found, Pace) else HALF_CAR
+    return record.pace if isinstance(record, HasPace) else HALF_CAR
 
 
 def pace_of_signals(measured: Array, period: float, noise: Array | None = None) -> Pace:
@@ -97,6 +100,6 @@ def _band(column: Array, period: float, sigma: float) -> tuple[float, float]:
     return float(slow), float(frequency[min(int(np.searchsorted(share, FASTEST)), len(frequency) - 1)])
 
 
-def shared_pace(records: Sequence[Any]) -> Pace:
+def shared_pace(records: Sequence[Record]) -> Pace:
     """The pace that logs are fitted at: that of the longest."""
     return pace_of(max(records, key=lambda r: len(r.measured) * r.period))

@@ -11,21 +11,25 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.pace import Pace, shared_pace
-from pneumo_ros.diagnosis.model import Model, parameters_at
+from pneumo_ros.diagnosis.model import Model, Record, parameters_at
+from pneumo_ros.diagnosis.traits import HasCoarse, HasModelForm, HasScale, HasSlowNoise
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
-MODEL_FORM_FLOOR = 2.5e-3  # of a channel's std: below it a model of this kind is not asked to explain anything
-COARSE_BELOW = 2.5e-3  # s; a slower log is coarse already
-REACH = 3.0  # prior sigmas that a nuisance parameter may move
-INITIAL_WIDENING = 3.0  # the measured initial state may be off by more than white noise says (it was low-passed)
-SELECT_EVERY = 3  # one of so many blocks is kept from the fit and used for selection
+# Share of a channel's std below which a model of this kind is not asked to explain anything [taste]
+MODEL_FORM_FLOOR: Final = 2.5e-3
+COARSE_BELOW: Final = 2.5e-3  # s between rows; a slower log is not halved for its sensitivities [numerics]
+REACH: Final = 3.0  # prior sigmas that a nuisance parameter may move [taste]
+# Factor on the std of the measured initial state: its samples were low-passed, which white noise does not know
+# [taste]
+INITIAL_WIDENING: Final = 3.0
+SELECT_EVERY: Final = 3  # one of so many blocks is kept from the fit and used for selection [taste]
 
 Part = tuple[str, str]  # effect id, site
 Item = TypeVar("Item")
@@ -68,7 +72,7 @@ class Problem:
     """
 
     model: Model
-    records: tuple[Any, ...]
+    records: tuple[Record, ...]
     own_average: int | None = None
     fold: int = SELECT_EVERY - 1
     threads: int = 1
@@ -119,7 +123,7 @@ class Problem:
         """(n, C) standard deviation of the sensor noise after averaging; what of it wanders does not average out."""
         out = []
         for r, real in zip(self.records, self._real, strict=True):
-            noise, slow = np.asarray(r.noise), np.asarray(getattr(r, "slow_noise", 0.0))
+            noise, slow = np.asarray(r.noise), np.asarray(r.slow_noise if isinstance(r, HasSlowNoise) else 0.0)
             white = np.sqrt(np.maximum(noise**2 - slow**2, 0.0)) if np.any(slow) else noise
             fast = white / np.sqrt(np.maximum(real.sum(axis=1), 1.0))
             out.append(np.hypot(fast, slow) if np.any(slow) else fast)
@@ -128,7 +132,7 @@ class Problem:
     @cached_property
     def expected(self) -> Array:
         """(n, C) what noise and the model form that a rig's maker states leave; the noise where none is stated."""
-        stated = [getattr(r, "model_form", 0.0) * scale_of(r) for r in self.records]
+        stated = [stated_form(r) * scale_of(r) for r in self.records]
         rows = [np.tile(s, (len(n), 1)) for s, n in zip(stated, self._real, strict=True)]
         return np.hypot(self.noise, np.vstack(rows))
 
@@ -233,12 +237,12 @@ class Problem:
         return float(np.sqrt(np.mean(np.sum((residual * sigma / scale) ** 2, axis=0) / there)))
 
     @cached_property
-    def coarse_records(self) -> tuple[Any, ...] | None:
+    def coarse_records(self) -> tuple[Record, ...] | None:
         """The logs at half the rate, if the model knows how: good enough for sensitivities at half the cost."""
-        coarse = getattr(self.model, "coarse", None)
-        if coarse is None or any(r.period > COARSE_BELOW for r in self.records):
+        model = self.model
+        if not isinstance(model, HasCoarse) or any(r.period > COARSE_BELOW for r in self.records):
             return None
-        return tuple(coarse(r) for r in self.records)
+        return tuple(model.coarse(r) for r in self.records)
 
     def predict_coarse(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) as :meth:`predict`, from the coarse logs."""
@@ -265,9 +269,14 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, "simulation")
 
 
-def form_of(record: Any) -> float:
+def stated_form(record: Record) -> float:
+    """Share of a channel's std that the maker's model form is worth; 0 where nothing is stated."""
+    return float(record.model_form) if isinstance(record, HasModelForm) else 0.0
+
+
+def form_of(record: Record) -> float:
     """Share of a channel's std that the maker's model form is worth, with the floor of any model of this kind."""
-    return float(np.hypot(MODEL_FORM_FLOOR, getattr(record, "model_form", 0.0)))
+    return float(np.hypot(MODEL_FORM_FLOOR, stated_form(record)))
 
 
 def _between(rows: Array, count: int) -> Array:
@@ -290,9 +299,7 @@ def average(samples: Array, count: int) -> Array:
     return np.asarray(np.add.reduce(grouped(samples, count), axis=1) * (1.0 / count))
 
 
-def scale_of(record: Any) -> Array:
+def scale_of(record: Record) -> Array:
     """Std of the log's channels, what the gap is normalised by; a constant channel counts as its noise."""
-    own = getattr(record, "scale", None)
-    if own is not None:
-        return np.maximum(own, np.maximum(record.noise, 1e-12))
-    return np.maximum(np.std(record.measured, axis=0), np.maximum(record.noise, 1e-12))
+    own = record.scale if isinstance(record, HasScale) else np.std(record.measured, axis=0)
+    return np.maximum(own, np.maximum(record.noise, 1e-12))

@@ -8,7 +8,7 @@ they find is the start of a free-run fit and no more: candidates are compared by
 
 from __future__ import annotations
 
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Record
 
-WINDOWS = 2  # in a time block
-FAILED_GAP = 1.0  # normalised gap of a free run that is worse than the log's own mean
+WINDOWS: Final = 2  # windows in a time block [taste]
+FAILED_GAP: Final = 1.0  # normalised gap of a free run that is worse than the log's own mean [definition]
 
 
 @runtime_checkable
@@ -50,7 +50,7 @@ def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, itera
     return fit(problem, candidate, begin, iterations=iterations)
 
 
-def _windows(record: Any, fold: int, block: float) -> list[Any]:
+def _windows(record: Record, fold: int, block: float) -> list[Any]:
     """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
     if not isinstance(record, Sliceable):
         return []

@@ -9,26 +9,39 @@ down-weighted (Huber) at a threshold that follows the misfit.
 Sensitivities come from forward differences of the compiled simulator; those of the nuisance parameters hardly change
 between candidates and are taken over from the refit for the first step. A step that gains about what they predicted
 carries them on by a secant; after one that does not they are taken anew.
+
+Why not ``scipy.optimize.least_squares``: this cost is no sum of squares, so that it has to be called in rounds with the
+weight of the data set anew, and it takes no sensitivities from elsewhere, neither borrowed nor carried on. On a session
+pair with an LVDT's scale error four rounds end at the same cost (-540.3) with 650 simulations in 1.6 s, this solver
+with 86 in 0.2 s. On structures that are wrong (cost 2700) rounds with its Huber loss go on to a cost 2 % lower, with
+1100 to 1750 simulations.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 
-HUBER = 4.0  # robust sigmas
-STEP = 2e-3  # forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate
-CENTRAL = 2e-3  # half width of the central differences
-TOLERANCE = 0.05  # of the cost; a diagnosis compares costs that differ by whole units
-NEAR = 0.3  # scaled units: sensitivities are borrowed for the next step only after a step shorter than this
-KEPT = 0.3  # share of the predicted gain from which sensitivities are carried on by a secant rather than taken anew
-COST_FLOOR = 0.05  # mean square, sigmas: keeps the logarithm finite on noise-free data
-START_DAMPING, MOST_DAMPING = 1e-4, 1e6
+HUBER: Final = 4.0  # robust sigmas from which a residual counts linearly instead of squared [taste]
+# Forward difference in scaled units: short, so that what nothing can tell apart stays exactly degenerate [numerics]
+STEP: Final = 2e-3
+CENTRAL: Final = 2e-3  # half width of the central differences, scaled units [numerics]
+TOLERANCE: Final = 0.05  # of the cost; a diagnosis compares costs that differ by whole units [numerics]
+# Scaled units: sensitivities are borrowed for the next step only after a step shorter than this [numerics]
+NEAR: Final = 0.3
+# Share of the predicted gain from which sensitivities are carried on by a secant rather than taken anew [numerics]
+KEPT: Final = 0.3
+COST_FLOOR: Final = 0.05  # mean square, sigma squared: keeps the logarithm finite on noise-free data [numerics]
+# Levenberg-Marquardt damping of a fit's first step, as a share of the curvature's diagonal [numerics]
+START_DAMPING: Final = 1e-4
+MOST_DAMPING: Final = 1e6  # largest damping; a step is nothing there [numerics]
 
 
 @dataclass(frozen=True)
@@ -239,21 +252,3 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     prior = problem.prior(state.candidate)
     H = strength * (A.T @ A) + np.diag(prior + 1e-9)
     return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
-
-
-def bounded_newton(H: Array, g: Array, low: Array, high: Array) -> Array:
-    """Minimiser of ``d H d / 2 + g d`` within bounds, by pinning what would leave them (a few rounds suffice)."""
-    move = np.zeros(len(g))
-    free = np.ones(len(g), dtype=bool)
-    for _ in range(8):
-        pinned = ~free
-        rhs = -(g[free] + H[np.ix_(free, pinned)] @ move[pinned])
-        move[free] = np.linalg.solve(H[np.ix_(free, free)], rhs)
-        out = free & ((move < low) | (move > high))
-        if not out.any():
-            break
-        move[out] = np.clip(move[out], low[out], high[out])
-        free &= ~out
-        if not free.any():
-            break
-    return np.clip(move, low, high)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -12,12 +13,15 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
+from pneumo_ros.diagnosis.traits import HasDerived
 from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
-LONGEST = 60  # fit samples over which the residual's correlation is summed
-TRUE_TO = 2e-3
-LAW = 0.015  # of an effect's value: another law of the same kind puts its parameter that far off
-NOTHING = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by
+LONGEST: Final = 60  # fit samples over which the residual's correlation is summed [numerics]
+TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
+# Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
+# [taste]
+LAW: Final = 0.015
+NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by [numerics]
 
 
 def covariance(problem: Problem, fit: Fit) -> Array:
@@ -40,7 +44,7 @@ def covariance(problem: Problem, fit: Fit) -> Array:
 
 
 def correlation_time(residual: Array) -> float:
-    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero, worst half of the channels."""
+    """Samples that count as one, 1 + 2 sum of autocorrelation up to its first zero; median of the channels."""
     times = []
     for column in (residual - residual.mean(axis=0)).T:
         power = float(column @ column)
@@ -90,7 +94,8 @@ def _derived(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estimate]:
         block = slice(first, first + len(parameters))
         values, own = fit.x[block] * scale, cov[block, block] * np.outer(scale, scale)
         first += len(parameters)
-        for one in getattr(problem.model.effects[effect], "derived", ()):
+        known = problem.model.effects[effect]
+        for one in known.derived if isinstance(known, HasDerived) else ():
             value = one.of(tuple(values))
             steps = 1e-6 * np.maximum(np.abs(values), 1e-6 * scale)
             slope = np.array([(one.of(tuple(values + s * e)) - value) / s for s, e in zip(steps, np.eye(len(steps)),

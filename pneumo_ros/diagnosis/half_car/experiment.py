@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,8 +17,8 @@ from pneumo_ros.diagnosis.result import Experiment
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import Trim, trim
 
-DURATION = 12.0  # s
-PERIOD = 2e-3  # s
+DURATION: Final = 12.0  # s, of a proposed experiment [taste]
+PERIOD: Final = 2e-3  # s between rows of a proposed experiment [definition]
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ def _steps(size: float, hold: float) -> Callable[[Array], Array]:
     return valves
 
 
-PROFILES = (
+# experiments that are compared; each is feasible on the rig [taste]
+PROFILES: Final = (
     Profile(
         "sweep-small",
         "sine sweep 0.5 to 20 Hz, 1 mm: friction sticks, viscous damping does not",

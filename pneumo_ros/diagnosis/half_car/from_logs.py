@@ -13,7 +13,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
-from pneumo_ros.diagnosis.search.competition import Progress
+from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
 from pneumo_ros.effects.configured import library_of, with_files
@@ -95,7 +95,7 @@ def prepared(
 
 
 def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:
-    """Refuse inputs that throw the nominal model off the road: no fit starts from there."""
+    """Refuse inputs on which the nominal model diverges from the start: no fit can start from there."""
     for log in logs:
         if not np.all(np.isfinite(model.simulate(log))):
             raise InputError(

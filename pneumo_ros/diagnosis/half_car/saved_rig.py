@@ -13,19 +13,22 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.loading import origin_of
+from pneumo_ros.effects.nuisance import NUISANCE
 from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import NUISANCE, RigModel
+from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
 
-_OUTLETS = ("outlet_area_front", "outlet_area_rear")
+# Numbers of the rig that its ends have of their own [definition]
+_OUTLETS: Final = ("outlet_area_front", "outlet_area_rear")
 
 
 def corrected_rig(found: Diagnosis, model: RigModel) -> Rig:

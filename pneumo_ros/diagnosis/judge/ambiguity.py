@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.judge.verdict import Opinion, name_of
 from pneumo_ros.diagnosis.search.selection import Scored, standard_error
 
-SAME = 0.1  # relative difference of selection scores that is no difference
-POSSIBLE = 0.05  # probability from which an effect is not excluded
-ANGLE = 8.0  # degrees between the trajectories of two effects, nuisance parameters answered, below which they are alike
+SAME: Final = 0.1  # relative difference of selection scores that is no difference [taste]
+POSSIBLE: Final = 0.05  # probability from which an effect is not excluded [taste]
+# Degrees between the trajectories of two effects, nuisance parameters answered, below which they are alike [taste]
+ANGLE: Final = 8.0
 
 
 def ambiguity_group(problem: Problem, opinion: Opinion, finalists: Sequence[Scored]) -> tuple[str, ...]:

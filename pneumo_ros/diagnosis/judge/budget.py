@@ -13,20 +13,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import factorial
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
-from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit, bounded_newton
+from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit
 from pneumo_ros.diagnosis.judge.held_out import free_run
 from pneumo_ros.diagnosis.search.growth import restricted
 from pneumo_ros.effects.parameters import Active, family_of
 
-DRAWS = 200
-WILD = 1e6  # squared error of a run that diverged
+DRAWS: Final = 200  # bootstrap draws of an interval [numerics]
+WILD: Final = 1e6  # squared error of a run that diverged [numerics]
 
 
 @dataclass(frozen=True)

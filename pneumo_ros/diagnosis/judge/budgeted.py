@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -21,8 +22,8 @@ from pneumo_ros.diagnosis.result import BudgetEntry, Remainder
 from pneumo_ros.diagnosis.search.growth import of_law
 from pneumo_ros.effects.parameters import Active, Curve, family_of
 
-WORTH = 0.3  # share of what is left that a place must close to be called the remainder's
-DIFFERS = "differs"
+WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
+DIFFERS: Final = "differs"  # law of an effect whose shape is needed beside its law [definition]
 
 
 @dataclass(frozen=True)

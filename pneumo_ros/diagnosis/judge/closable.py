@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
@@ -22,9 +22,9 @@ from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.growth import of_law, reduced, with_parts
 from pneumo_ros.effects.parameters import Active, family_of
 
-STEPS = 4  # iterations of a fit with something added or taken away
-SLACK = 0.03  # of what there was to close: what a law of the right kind may leave without a word
-TOGETHER = 3  # places at which a remainder is looked for together
+STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
+SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
+TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     """
     left = held_by(problem, best, holdout).total
     own = _above(left, floor)
-    stated = getattr(holdout, "model_form", 0.0) > 0.0
+    stated = stated_form(holdout) > 0.0
     remainders: dict[tuple[str, ...], Remainder] = {}
 
     def added(where: tuple[str, ...]) -> Remainder:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.pace import pace_of
-from pneumo_ros.diagnosis.fit.problem import INITIAL_WIDENING, scale_of
-from pneumo_ros.diagnosis.fit.solver import bounded_newton
+from pneumo_ros.diagnosis.fit.problem import INITIAL_WIDENING, scale_of, stated_form
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.effects.parameters import Active
 
@@ -91,7 +91,7 @@ def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, s
 
 def total_floor(record: Any) -> float:
     """Gap that sensors' noise and the model's stated form leave together."""
-    return float(np.hypot(total_gap(noise_floor(record)), getattr(record, "model_form", 0.0)))
+    return float(np.hypot(total_gap(noise_floor(record)), stated_form(record)))
 
 
 def noise_floor(record: Any) -> Array:

@@ -15,6 +15,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, free_run, total_gap
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import EditTest
+from pneumo_ros.diagnosis.traits import HasChanges
 from pneumo_ros.effects.parameters import Active
 
 
@@ -51,8 +52,7 @@ def edit_test(problem: Problem, edit: Any, base: Fit, best: Fit) -> EditTest:
     """Predict a log of the rig after a known change: what the log's configuration states differently is applied to the
     estimates as a factor; nothing is fitted again."""
     model = problem.model
-    changes = getattr(model, "changes", None)
-    factors: dict[str, float] = {} if changes is None else changes(edit)
+    factors = model.changes(edit) if isinstance(model, HasChanges) else {}
     scale = np.array([factors.get(p.name, 1.0) for p in model.parameters])
     nominal = np.array([p.nominal for p in model.parameters])
     active = problem.active(best.candidate, problem.values(best.candidate, best.x))

@@ -13,8 +13,8 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
-from pneumo_ros.diagnosis.search.competition import Search
 from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import Active
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,9 +15,13 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.report.quantities import readable
 from pneumo_ros.diagnosis.report.words import effect_name, place_words, site_words
 
-INK, SOFT, NAMED, OTHER, LEFT = "#212529", "#5c6670", "#1c6fb8", "#adb5bd", "#f06514"
-DENSE = 0.25  # of the fullest bin: thinner ones are drawn faint
-SHOWN = 0.005  # share below which a row says nothing
+INK: Final = "#212529"  # colour of text [display]
+SOFT: Final = "#5c6670"  # colour of lines and notes [display]
+NAMED: Final = "#1c6fb8"  # colour of a named effect [display]
+OTHER: Final = "#adb5bd"  # colour of the tolerances [display]
+LEFT: Final = "#f06514"  # colour of the remainder [display]
+DENSE: Final = 0.25  # share of the fullest bin: thinner ones are drawn faint [display]
+SHOWN: Final = 0.005  # share of the gap below which the waterfall has no row [display]
 
 
 def budget_rows(summary: Mapping[str, Any]) -> list[dict[str, Any]]:

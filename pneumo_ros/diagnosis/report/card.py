@@ -5,15 +5,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from pneumo_ros.diagnosis.report.rig_map import draw_map
 from pneumo_ros.diagnosis.signals import MEASURED
 
-TITLES = {
+# names of the channels on the page [display]
+TITLES: Final = {
     "sprung_front": "body above front axle", "sprung_rear": "body above rear axle", "unsprung_front": "front axle",
     "unsprung_rear": "rear axle", "front_pressure": "front air pressure", "rear_pressure": "rear air pressure",
 }  # fmt: skip
-UNITS = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+# channel -> (unit shown, factor from SI) [display]
+UNITS: Final = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
 
 
 @dataclass(frozen=True)
@@ -34,4 +37,4 @@ class RigCard:
     name: str = ""
 
 
-HALF_CAR = RigCard(TITLES, UNITS, draw_map)
+HALF_CAR: Final = RigCard(TITLES, UNITS, draw_map)  # how the page shows the half car [display]

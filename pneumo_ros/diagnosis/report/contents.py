@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,8 +30,8 @@ from pneumo_ros.diagnosis.report.words import (
 )
 from pneumo_ros.diagnosis.where import Law
 
-ZOOM = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off
-SHOWN_CHANNELS = 2  # the rest is folded away
+ZOOM: Final = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off [display]
+SHOWN_CHANNELS: Final = 2  # channels that are shown at once; the others are folded away [display]
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
     }
 
 
-_DRAWN = ("nominal", "refit", "best")
+_DRAWN: Final = ("nominal", "refit", "best")  # runs that are drawn over the log [display]
 
 
 def _zoom(log: Any, refit: Array) -> tuple[int, int]:
@@ -250,7 +250,8 @@ def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     return [quantity_cells(name, value) for name, value in winner(summary)["parameters"].items()]
 
 
-_RIVALS = {
+# sentence above the rivals of a verdict [display]
+_RIVALS: Final = {
     "none": "These are not excluded; what they would explain here is too little to accept one:",
     "unknown": "These come closest, and one may be it by another law than the library's:",
 }

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -26,8 +27,9 @@ from pneumo_ros.effects.loading import laws_of, own_ids
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 
-MAX_LAWS = 2
-FILES = ("diagnosis.json", "report.html", "residual.mcap")
+MAX_LAWS: Final = 2  # places whose missing law is drawn [display]
+# names of the files that a diagnosis leaves [definition]
+FILES: Final = ("diagnosis.json", "report.html", "residual.mcap")
 
 
 def claim_folder(folder: Path) -> None:
@@ -47,25 +49,12 @@ def claim_folder(folder: Path) -> None:
         raise InputError(f"cannot write there ({reason})", where=folder, remedy="choose another folder") from error
 
 
-def write_outputs(
-    folder: Path,
-    diagnosis: Diagnosis,
-    model: RigModel,
-    fit: Sequence[Signals],
-    holdout: Signals,
-    location: Location | None = None,
-    asked: Asked | None = None,
+def write_files(
+    folder: Path, diagnosis: Diagnosis, findings: Findings, write_residuals: Callable[[Path], None]
 ) -> tuple[list[Path], Story]:
-    """Write all files of a diagnosis of the half car; older ones of the same names are replaced.
+    """Write report.html, residual.mcap (by ``write_residuals``) and, last, diagnosis.json; older ones are replaced.
 
     diagnosis.json, which programs look for, comes last: where it is new, the others are.
-
-    Parameters
-    ----------
-    folder : made if it is not there
-    fit, holdout : the logs that were fitted and held out
-    location : from :func:`pneumo_ros.diagnosis.where.locate` on these logs, if it is at hand
-    asked : what the user typed
 
     Returns
     -------
@@ -77,12 +66,35 @@ def write_outputs(
         if the folder cannot be made or written.
     """
     claim_folder(folder)
-    where = location or locate(model, fit, holdout)
-    findings = replace(_findings(diagnosis, model, fit, holdout, where), asked=asked)
     write_report(folder / FILES[1], findings)
-    write_residual_log(folder / FILES[2], holdout, diagnosis.trajectories)
+    write_residuals(folder / FILES[2])
     write_json(diagnosis, folder / FILES[0])
     return [folder / name for name in FILES], told(findings)
+
+
+def write_outputs(
+    folder: Path,
+    diagnosis: Diagnosis,
+    model: RigModel,
+    fit: Sequence[Signals],
+    holdout: Signals,
+    location: Location | None = None,
+    asked: Asked | None = None,
+) -> tuple[list[Path], Story]:
+    """Write all files of a diagnosis of the half car, see :func:`write_files`.
+
+    Parameters
+    ----------
+    folder : made if it is not there
+    fit, holdout : the logs that were fitted and held out
+    location : from :func:`pneumo_ros.diagnosis.where.locate` on these logs, if it is at hand
+    asked : what the user typed
+    """
+    where = location or locate(model, fit, holdout)
+    findings = replace(_findings(diagnosis, model, fit, holdout, where), asked=asked)
+    return write_files(
+        folder, diagnosis, findings, lambda path: write_residual_log(path, holdout, diagnosis.trajectories)
+    )
 
 
 def _findings(

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from importlib import resources
 from pathlib import Path
+from typing import Final
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
@@ -16,7 +17,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.printable import shown
 
-TEMPLATE = "template.html.j2"
+TEMPLATE: Final = "template.html.j2"  # file of the page's template [definition]
 
 
 def render(found: Findings) -> str:

@@ -6,15 +6,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 
-LEFT, RIGHT, TOP, BOTTOM = 62, 10, 8, 22
-MAX_POINTS = 700  # vertices a line is reduced to; extremes of each piece are kept
+LEFT: Final = 62  # px, margin for the value axis [display]
+RIGHT: Final = 10  # px, margin [display]
+TOP: Final = 8  # px, margin [display]
+BOTTOM: Final = 22  # px, margin for the time axis [display]
+MAX_POINTS: Final = 700  # vertices a line is reduced to; extremes of each piece are kept [display]
 
 
 class Line(NamedTuple):

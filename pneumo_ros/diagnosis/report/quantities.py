@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -41,7 +41,8 @@ def _shown(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-_READABLE = {
+# SI unit -> (unit shown, factor, smallest value in SI that it is used from) [display]
+_READABLE: Final = {
     "m": (("mm", 1e3, 0.5), ("µm", 1e6, 5e-4)), "m2": (("mm²", 1e6, 1e-2),), "m3": (("cm³", 1e6, 1e-2),),
     "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 5e-3)),
 }  # fmt: skip

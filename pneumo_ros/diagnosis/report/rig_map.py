@@ -5,21 +5,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
-WIDTH, HEIGHT = 640, 400
-MARGIN = 10  # for labels beside the rig
-FRONT, REAR = 200.0, 440.0  # x of the axles; the front is on the left
-BODY_TOP, BODY_BOTTOM = 118.0, 150.0
-SPRING_BOTTOM, AXLE_BOTTOM = 232.0, 254.0
-TYRE_CENTRE, TYRE_RADIUS = 290.0, 34.0
-ROAD = 326.0
+WIDTH: Final = 640  # px [display]
+HEIGHT: Final = 400  # px [display]
+MARGIN: Final = 10  # px, for labels beside the rig [display]
+FRONT: Final = 200.0  # px, x of the front axle; the front is on the left [display]
+REAR: Final = 440.0  # px, x of the rear axle [display]
+BODY_TOP: Final = 118.0  # px [display]
+BODY_BOTTOM: Final = 150.0  # px [display]
+SPRING_BOTTOM: Final = 232.0  # px [display]
+AXLE_BOTTOM: Final = 254.0  # px [display]
+TYRE_CENTRE: Final = 290.0  # px [display]
+TYRE_RADIUS: Final = 34.0  # px [display]
+ROAD: Final = 326.0  # px [display]
 
-# From no share to all of it: grey paper to a strong orange; both ends keep black text readable.
-COLD, HOT = (233, 236, 239), (240, 101, 20)
-SHOWN = 0.05  # share from which a part is labelled
+COLD: Final = (233, 236, 239)  # RGB of no share: grey paper; keeps black text readable [display]
+HOT: Final = (240, 101, 20)  # RGB of the whole gap: a strong orange; keeps black text readable [display]
+SHOWN: Final = 0.05  # share from which a part is labelled [display]
 
 
-PAINT = 'fill="{fill}" stroke="{edge}" stroke-width="1.5"'
+PAINT: Final = 'fill="{fill}" stroke="{edge}" stroke-width="1.5"'  # SVG attributes of a part [display]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pneumo_ros.diagnosis.report.words import LIKELY, first_place, forbidden, place_words
 from pneumo_ros.diagnosis.result import ROAD_FILE, VALVE_FILE
 
-# For a place without a name: (what moves it, the road that does).
-_TELLING = {
+# For a place without a name: (what moves it, the road that does) [display]
+_TELLING: Final = {
     "air": ("sweeps the valves' whole range on a smooth road", "--road flat --controller third_order_smc"),
     "supply": ("draws air from both ends at once", "--road E"),
     "force": ("moves the springs slowly and fast, by little and by much", "--road sweep"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,8 +35,8 @@ from pneumo_ros.diagnosis.report.words import (
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.sheet import check_words
 
-TOLD = 3  # signals, rivals and own parameters that are told first
-MOVED = 1.0  # tolerances from which a parameter of the rig is worth telling
+TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
+MOVED: Final = 1.0  # tolerances from which a parameter of the rig is worth telling [display]
 
 
 @dataclass(frozen=True)

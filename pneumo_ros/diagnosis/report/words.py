@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from pneumo_ros.diagnosis.signals.types import NO_VERDICT
 
-SURE, LIKELY = 0.9, 0.6
-STANDS_OUT = 0.05  # share of the gap from which a place is named
-UNNAMED = ("none", "unknown", "not_testable")
+SURE: Final = 0.9  # probability from which the page says "sure" [display]
+LIKELY: Final = 0.6  # probability from which the page says "likely" [display]
+STANDS_OUT: Final = 0.05  # share of the gap from which a place is named [display]
+UNNAMED: Final = ("none", "unknown", "not_testable")  # verdicts that name no effect [definition]
 
 
 def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
@@ -72,7 +73,8 @@ def first_place(summary: Mapping[str, Any]) -> str:
     return place_words(places[0]["place"]) if places else ""
 
 
-_SENSORS = {
+# names of the sensors in sentences [display]
+_SENSORS: Final = {
     "sprung_front": "the LVDT at the body's front", "sprung_rear": "the LVDT at the body's rear",
     "unsprung_front": "the front axle's LVDT", "unsprung_rear": "the rear axle's LVDT",
     "front_pressure": "the front pressure sensor", "rear_pressure": "the rear pressure sensor",

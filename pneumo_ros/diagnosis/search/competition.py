@@ -10,16 +10,17 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
+from pneumo_ros.diagnosis.search.fitting import by_cost, finished, probed, rescued, short_fits, varied
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
@@ -28,104 +29,22 @@ from pneumo_ros.diagnosis.search.screening import (
     trials,
     visibility,
 )
-from pneumo_ros.diagnosis.search.selection import FORM, PARAMETER_PENALTY, Thresholds, noise_level, score, used_unknowns
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level, score
+from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.errors import InputError
 
-PROBE = 5  # iterations of the fit of a probed candidate
-LOPSIDED = (0.1, 0.6)  # share of the nominal model's misfit outside which the kept blocks are chosen anew
-NOT_EVIDENT = 0.9  # of the fall that a second effect must bring
-STARTED_TWICE = 3  # leading singles whose shape parameters are started from elsewhere as well
-Progress = Callable[[float, str], None]  # share done 0..1, what is being done
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is fitted; more of each finds rarer combinations and costs time in proportion.
-
-    Attributes
-    ----------
-    singles : singles that get a short fit
-    finalists : singles fitted to convergence
-    seconds : second effects tried on the first, second, ... leader
-    blind_pairs : pairs taken from the screening at the refit
-    pair_finalists : pairs fitted to convergence
-    probes : second effects probed on each leader
-    exchanged : rivals probed in place of each effect of the best pair
-    short, anew, long : iterations of a short fit, of one from another shape, of a full one
-    """
-
-    singles: int = 10
-    finalists: int = 5
-    seconds: tuple[int, ...] = (6, 4, 2)
-    blind_pairs: int = 3
-    pair_finalists: int = 3
-    probes: int = 24
-    exchanged: int = 6
-    short: int = 6
-    anew: int = 5
-    long: int = 10
-
-
-@dataclass
-class Search:
-    """The state of a competition; ends as its result.
-
-    Attributes
-    ----------
-    logged : the problem with the command's jumps where the logs have them
-    problem : the same as last timed
-    refit : the nominal structure re-estimated
-    singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
-    structures : leading ones with the shapes of their families, and those that grew from them
-    screened : screening of the singles at the refit, for the report
-    lost : labels of candidates whose fit diverged
-    visible : effect id -> rms in sigmas that its typical size would move the outputs by
-    """
-
-    logged: Problem
-    problem: Problem
-    refit: Fit
-    effort: Effort
-    progress: Progress
-    singles: list[Fit] = field(default_factory=list)
-    pairs: list[Fit] = field(default_factory=list)
-    structures: list[Fit] = field(default_factory=list)
-    screened: list[CandidateScore] = field(default_factory=list)
-    lost: list[str] = field(default_factory=list)
-    visible: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def finalists(self) -> list[Fit]:
-        """Every converged structure; of those with the same laws, with and without shapes, the one of lowest price."""
-        best: dict[tuple[Part, ...], Fit] = {}
-        for one in (*self.laws, *self.structures):
-            rival = best.get(one.candidate.laws)
-            if rival is None or _price(one) < _price(rival):
-                best[one.candidate.laws] = one
-        return list(best.values())
-
-    @property
-    def laws(self) -> list[Fit]:
-        """Converged singles and pairs by their laws alone."""
-        return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
-
-    @property
-    def best(self) -> Fit:
-        """Lowest training cost of all."""
-        return min([self.refit, *self.finalists], key=lambda f: f.cost)
-
-
-def _price(one: Fit) -> float:
-    """Training cost with the penalty of what was fitted, and a little for each shape: a law that does as well wins."""
-    return one.cost + PARAMETER_PENALTY * used_unknowns(one) + len(one.candidate.shapes)
+# Shares of the nominal model's misfit outside which another fold is kept from the fit [taste]
+LOPSIDED: Final = (0.1, 0.6)
+# Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
+NOT_EVIDENT: Final = 0.9
+STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 
 
 def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -> Search:
     """Run the competition; ``progress`` is called with the share done."""
     progress(0.0, "re-estimating the nominal model")
     nominal = Candidate()
-    refit = _rescued(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), 15)
+    refit = rescued(problem, fit(problem, nominal, problem.start(nominal, None, ()), iterations=15), 15)
     if refit.diverged:
         raise InputError("the nominal model runs away on these logs, whatever its tolerances",
                          where=", ".join(r.name for r in problem.records),
@@ -159,14 +78,6 @@ def _choose_fold(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
     return problem, fit(problem, refit.candidate, refit.x, refit.jacobian, iterations=15)
 
 
-def _rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
-    """The fit, or, where its free run failed, the better one that starts from short windows."""
-    if not free_run_failed(problem, state):
-        return state
-    other = fit_from_windows(problem, state.candidate, state.x, iterations)
-    return state if other is None or not other.cost < state.cost else other
-
-
 def room_for_more(search: Search) -> bool:
     """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
     blocks is so near the sensors' noise that even all of the rest would not be enough.
@@ -186,8 +97,8 @@ def _time_jumps(search: Search) -> None:
     search.refit = fit(moved, Candidate(), search.refit.x, search.refit.jacobian)
     singles, pairs = search.effort.finalists, search.effort.pair_finalists
     done = len(search.singles[:singles])
-    search.singles = _by_cost(again[:done]) + search.singles[singles:]
-    search.pairs = _by_cost(again[done:]) + search.pairs[pairs:]
+    search.singles = by_cost(again[:done]) + search.singles[singles:]
+    search.pairs = by_cost(again[done:]) + search.pairs[pairs:]
 
 
 def _run_singles(search: Search) -> None:
@@ -200,10 +111,10 @@ def _run_singles(search: Search) -> None:
     chosen = varied(probed(problem, search.refit, search.screened), effort.singles, 3)
     short = short_fits(search, search.refit, chosen, (0.1, 0.4))
     ended = [
-        _finish(problem, one, effort, search.refit if k < STARTED_TWICE else None)
+        finished(problem, one, effort, search.refit if k < STARTED_TWICE else None)
         for k, one in enumerate(short[: effort.finalists])
     ]
-    search.singles = _by_cost(ended) + short[effort.finalists :]
+    search.singles = by_cost(ended) + short[effort.finalists :]
 
 
 def _run_pairs(search: Search) -> None:
@@ -227,9 +138,9 @@ def _run_pairs(search: Search) -> None:
         short += short_fits(search, leader, unseen(screened, (part,), count), span)
     found = trials(problem, search.refit, all_parts(problem))
     blind = unseen(candidate_scores(problem, search.refit, found, pairs=True), (), effort.blind_pairs)
-    short = _by_cost(short + short_fits(search, search.refit, blind, (0.8, 0.85)))
-    ended = [_finish(problem, one, effort) for one in short[: effort.pair_finalists]]
-    search.pairs = _by_cost(ended) + short[effort.pair_finalists :]
+    short = by_cost(short + short_fits(search, search.refit, blind, (0.8, 0.85)))
+    ended = [finished(problem, one, effort) for one in short[: effort.pair_finalists]]
+    search.pairs = by_cost(ended) + short[effort.pair_finalists :]
     _exchange_each(search)
     _try_without_each(search)
 
@@ -252,7 +163,7 @@ def _exchange_each(search: Search) -> None:
         screened = candidate_scores(problem, alone, trials(problem, alone, rivals))
         fresh = [p for p in screened if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
         for short in short_fits(search, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
-            search.pairs = _by_cost([*search.pairs[: effort.pair_finalists], _finish(problem, short, effort)])
+            search.pairs = by_cost([*search.pairs[: effort.pair_finalists], finished(problem, short, effort)])
 
 
 def _rivals(problem: Problem, part: Part, other: Part) -> bool:
@@ -291,85 +202,4 @@ def _try_without_each(search: Search) -> None:
         before = min((f.cost for f in search.finalists if f.candidate == candidate), default=np.inf)
         if alone.cost < before - 1.0:
             rest = [f for f in search.singles if f.candidate != candidate]
-            search.singles = _by_cost([alone, *rest[: search.effort.finalists]]) + rest[search.effort.finalists :]
-
-
-def varied(screened: Sequence[CandidateScore], count: int, sites: int) -> list[CandidateScore]:
-    """Those with the best scores, but not more than a few sites of one effect, so that rivals of another kind get their
-    chance.
-    """
-    taken: list[CandidateScore] = []
-    for one in screened:
-        kind = [effect for effect, _ in one.parts]
-        if sum([effect for effect, _ in p.parts] == kind for p in taken) < sites:
-            taken.append(one)
-        if len(taken) == count:
-            break
-    return taken
-
-
-def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> list[CandidateScore]:
-    """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
-    those end at: the screening is linear, and a typical size may be far from the true one.
-    """
-    own = problem.values(base.candidate, base.x)
-    ranked = []
-    for entry in screened:
-        candidate = Candidate((*base.candidate.parts, *entry.parts))
-        start = problem.start(candidate, base.x[: problem.fixed], [*own, *entry.values])
-        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
-        values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
-        ranked.append((one.cost, entry if one.diverged else replace(entry, values=values)))
-    return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
-
-
-def short_fits(search: Search, base: Fit, chosen: Sequence[CandidateScore], span: tuple[float, float]) -> list[Fit]:
-    """Each chosen candidate on top of the base, fitted for ``effort.short`` iterations, lowest training cost first;
-    those that diverge are noted in ``search.lost``. ``span`` : share of the whole search done before and after.
-    """
-    problem, out = search.problem, []
-    for k, entry in enumerate(chosen):
-        candidate = Candidate((*base.candidate.parts, *entry.parts))
-        search.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
-        values = [*problem.values(base.candidate, base.x), *entry.values]
-        start = problem.start(candidate, base.x[: problem.fixed], values)
-        one = fit(problem, candidate, start, base.jacobian, iterations=search.effort.short, shared=len(base.x))
-        one = _rescued(problem, one, search.effort.short)
-        if one.diverged:
-            search.lost.append(candidate.label)
-        else:
-            out.append(one)
-    return _by_cost(out)
-
-
-def _finish(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = None) -> Fit:
-    """To convergence, from where the short fit ended; with a fit to start ``anew`` from, also from its effect's other
-    shapes and signs there; the best.
-    """
-    best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
-    parameters = problem.effect_parameters(short.candidate)
-    if anew is None or all(p.size for p in parameters):
-        return best
-    for values in starts_elsewhere(parameters, problem.values(best.candidate, best.x)):
-        # Not from where this fit ended: its tolerance parameters have adapted to the shape it has.
-        start = problem.start(short.candidate, anew.x[: problem.fixed], values)
-        other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
-        if other.cost < best.cost - 1.0:
-            best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
-    return best
-
-
-def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
-    """Starts away from where a fit ended: each shape at its further starts, and each size with the other sign."""
-    out = []
-    for k, p in enumerate(parameters):
-        if not p.size:
-            out += [[value if m == k else float(v) for m, v in enumerate(found)] for value in p.starts]
-            continue
-        other = [value for value in (p.typical, *p.starts) if value * found[k] < 0.0][:1]
-        out += [[value if m == k else q.typical for m, q in enumerate(parameters)] for value in other]
-    return out
-
-
-def _by_cost(fits: Iterable[Fit]) -> list[Fit]:
-    return sorted(fits, key=lambda f: f.cost)
+            search.singles = by_cost([alone, *rest[: search.effort.finalists]]) + rest[search.effort.finalists :]

@@ -9,6 +9,7 @@ close: the misfit of a law must not pass for a second effect.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -16,23 +17,27 @@ from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.search.competition import Search, probed, room_for_more, short_fits, varied
+from pneumo_ros.diagnosis.search.competition import room_for_more
+from pneumo_ros.diagnosis.search.fitting import probed, short_fits, varied
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
+from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
-MOST = 6  # effects in a structure
-SHAPED = (3, 2)  # leading singles and pairs that are fitted with their shapes
-SHAPE_STEPS = 5  # iterations of a fit with shapes, from its laws' end
-COUNTS = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end
-EXCHANGED = (8, 1, 1)  # the same for each effect that is exchanged
-ROUNDS = 9  # additions and exchanges at most
-# Mean square on the kept blocks above which a structure is wrong: sigma squared, and as a share of the refit's.
-MISFIT, MISFIT_OF_REFIT = 4.0, 0.01
-STEP = 0.3  # of the gain that would be evident: what a round must bring, as a step towards one that is
-EXCHANGES, MISSED_LEAST = 3, 3  # times that no addition helps; effects that are then tried for exchange
-STEPS = 5
-IDLE = 0.02  # mean square, sigmas, that a shape may close without being missed
+MOST: Final = 6  # effects in a structure [numerics]
+SHAPED: Final = (3, 2)  # leading singles and pairs that are fitted with their shapes [numerics]
+SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
+COUNTS: Final = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
+EXCHANGED: Final = (8, 1, 1)  # the same for each effect that is exchanged [numerics]
+ROUNDS: Final = 9  # additions and exchanges at most [numerics]
+MISFIT: Final = 4.0  # mean square on the kept blocks, sigma squared, above which a structure is wrong [taste]
+MISFIT_OF_REFIT: Final = 0.01  # the same as a share of the refit's [taste]
+# Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
+STEP: Final = 0.3
+EXCHANGES: Final = 3  # times that no addition helps and exchanges are tried [numerics]
+MISSED_LEAST: Final = 3  # effects that are then tried for exchange [numerics]
+STEPS: Final = 5  # iterations of a fit without some parts [numerics]
+IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without being missed [taste]
 
 
 def grow(search: Search, limits: Thresholds, further: bool = True) -> None:

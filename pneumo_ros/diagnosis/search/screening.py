@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,9 @@ from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, HUBER, Fit, robust_scale
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.effects.parameters import Active, EffectParameter, family_of, is_law
 
-SENSOR = "sensor:"  # how the contract's places of sensors begin
-SMALL = 0.15  # of the typical size: an effect may be saturated at its typical size already
+SENSOR: Final = "sensor:"  # how the contract's places of sensors begin [definition]
+# Share of the typical size of a second start: an effect may be saturated at its typical size already [taste]
+SMALL: Final = 0.15
 
 
 @dataclass(frozen=True)

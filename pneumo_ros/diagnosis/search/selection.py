@@ -12,6 +12,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
@@ -20,10 +21,11 @@ from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.paths import share_file
 
-FORM = 0.5  # mean square, sigmas, that is added to both levels compared: what model form leaves is no evidence
-PARAMETER_PENALTY = 4.0  # of the cost, for each parameter, and for each effect that is claimed at both ends
-UNUSED = 1e-3  # of a typical amplitude: an atom that stands at nothing
-SAME = 0.05  # relative difference of levels that is none, whatever the blocks say
+# Mean square, sigma squared, that is added to both levels compared: what model form leaves is no evidence [taste]
+FORM: Final = 0.5
+PARAMETER_PENALTY: Final = 4.0  # cost of each parameter, and of each effect that is claimed at both ends [taste]
+UNUSED: Final = 1e-3  # share of a typical amplitude below which an atom counts as absent [numerics]
+SAME: Final = 0.05  # relative difference of levels that counts as none, whatever the blocks say [taste]
 
 
 @dataclass(frozen=True)

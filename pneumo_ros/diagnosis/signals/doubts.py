@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Final
 
 import numpy as np
 
@@ -14,13 +15,16 @@ from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import GRAVITY
 
-ROAD_LIMIT = 0.5  # m; the exciter moves by centimetres
-CLOCK_STEP = 0.05  # s by which a topic's delay may move against the others: a stalled recorder delays all alike
-PIECES = 3  # the delay of the first third is compared with the last third's
-# Spring force over static load at the middle of a log. An atmosphere is 0.6 of the front spring's gauge pressure and
-# 0.3 of the rear's: gauge pressures read as absolute carry about 0.56 and 0.77. An area or a load that is off by a
-# tenth at both ends stays outside.
-CARRIED, NOT_CARRIED = (0.9, 1.1), 0.85
+ROAD_LIMIT: Final = 0.5  # m; the exciter moves by centimetres [physics]
+# s by which a topic's delay may move against the others: a stalled recorder delays all alike [taste]
+CLOCK_STEP: Final = 0.05
+PIECES: Final = 3  # the delay of the first third is compared with the last third's [numerics]
+# Spring force over static load at the middle of a log that is right: an area or a load off by a tenth at both ends
+# stays outside [physics]
+CARRIED: Final = (0.9, 1.1)
+# The same of gauge pressures read as absolute, at most: an atmosphere is 0.6 of the front and 0.3 of the rear gauge
+# pressure, so that they carry about 0.56 and 0.77 [physics]
+NOT_CARRIED: Final = 0.85
 
 
 def check_road_unit(heights: Array, log: str) -> None:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +14,22 @@ from pneumo_ros.diagnosis.signals.noise import quantum, white_noise
 from pneumo_ros.diagnosis.signals.types import MEASURED, NO_VERDICT, Limitation
 from pneumo_ros.errors import InputError
 
-MIN_RUN = 10  # equal samples in a row that are suspicious at all
-QUANTISED_RUN = 250  # the same where values are visibly quantised: slow motion stays within a step
-FEW = 100  # samples from which a typical run length is taken
-RUN_FACTOR = 5.0  # times the run length that quantisation explains elsewhere in the channel
-GLITCH_SIGMA = 15.0
-# What nearly every sample keeps to, as sigmas of a normal law: a chattering valve makes a zigzag of the pressure,
-# each of whose tips stands alone, and the median of a median filter's rest says nothing.
-COMMON, COMMON_SIGMA = 0.98, 2.33
-MOSTLY = 0.5  # a channel with fewer real samples than this share is left out
-NOISE_FACTOR = 2.0  # estimated against stated noise, either way
-DISPLACEMENT_LIMIT = 0.5  # m; the rig is 0.5 m long and moves by centimetres
-PRESSURE_RANGE = (5e4, 3e6)  # Pa absolute
+MIN_RUN: Final = 10  # equal samples in a row that are suspicious at all [taste]
+QUANTISED_RUN: Final = 250  # the same where values are visibly quantised: slow motion stays within a step [taste]
+FEW: Final = 100  # samples from which a typical run length is taken [numerics]
+RUN_FACTOR: Final = 5.0  # times the run length that quantisation explains elsewhere in the channel [taste]
+GLITCH_SIGMA: Final = 15.0  # robust sigmas from which a lone sample is a glitch [taste]
+# share of samples that tells a channel's usual deviation: a chattering valve makes a zigzag of the pressure, each of
+# whose tips stands alone, which the median of a median filter's rest does not see [taste]
+COMMON: Final = 0.98
+COMMON_SIGMA: Final = 2.33  # sigmas within which a normal law has that share of its samples (98 %) [definition]
+MOSTLY: Final = 0.5  # a channel with fewer real samples than this share is left out [taste]
+NOISE_FACTOR: Final = 2.0  # estimated against stated noise, either way [taste]
+DISPLACEMENT_LIMIT: Final = 0.5  # m; the rig is 0.5 m long and moves by centimetres [physics]
+PRESSURE_RANGE: Final = (5e4, 3e6)  # Pa absolute, half an atmosphere to thirty [physics]
 
-LOST = {
+# what the diagnosis cannot do without a channel [display]
+LOST: Final = {
     "sprung_front": "the body's motion at the front is inferred, and a front force error is less sharply located",
     "sprung_rear": "the body's motion at the rear is inferred, and a rear force error is less sharply located",
     "unsprung_front": "the front tyre cannot be told from the front spring",

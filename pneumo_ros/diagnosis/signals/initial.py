@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
 
-# 60 ms: half a period of wheel hop (9 Hz), which a cubic follows to 1 % of its amplitude, while 30 samples of 10 um
-# noise give rates to 2 mm/s.
-WINDOW = 0.06  # s
-DEGREE = 3
-UNKNOWN_HEIGHT_STD = 5e-3  # m, a spring's height when one of its two sensors is missing
-UNKNOWN_RATE_STD = 0.05  # m/s
-UNKNOWN_PRESSURE_STD = 0.1  # relative
+# s: half a period of wheel hop (9 Hz), which a cubic follows to 1 % of its amplitude, while 30 samples of 10 um noise
+# give rates to 2 mm/s [physics]
+WINDOW: Final = 0.06
+DEGREE: Final = 3  # degree of the polynomial in the window [physics]
+UNKNOWN_HEIGHT_STD: Final = 5e-3  # m, a spring's height when one of its two sensors is missing [taste]
+UNKNOWN_RATE_STD: Final = 0.05  # m/s, of a point whose sensor is missing [taste]
+UNKNOWN_PRESSURE_STD: Final = 0.1  # relative, of a pressure whose sensor is missing [taste]
 
 
 class Initial(NamedTuple):

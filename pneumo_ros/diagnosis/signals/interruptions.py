@@ -4,20 +4,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.signals.types import Limitation
 
-DRIVER = "daq"  # the node whose events tell of the valves
-ARMED, DISARMED = "armed", ("disarmed", "estop")
-REFUSED = ("command_stale", "command_invalid")
-ERROR = 2  # level of an event from which the driver makes the valves safe
-SETTLING = 0.5  # s after arming: no command yet, or a ramp to it
-DIFFERS = 0.01  # of the largest opening, from which applied and commanded are two things
-TELLING = 0.005  # share of rows; less is a sample's age at the ends of a ramp
+DRIVER: Final = "daq"  # the node whose events tell of the valves [definition]
+ARMED: Final = "armed"  # event by which the driver takes commands [definition]
+DISARMED: Final = ("disarmed", "estop")  # events after which it does not [definition]
+REFUSED: Final = ("command_stale", "command_invalid")  # events of a command that was not obeyed [definition]
+ERROR: Final = 2  # level of an event from which the driver makes the valves safe [definition]
+SETTLING: Final = 0.5  # s after arming: no command yet, or a ramp to it [taste]
+DIFFERS: Final = 0.01  # share of the largest opening from which applied and commanded differ [taste]
+# Share of rows in which they must differ to be told; less is a sample's age at the ends of a ramp [taste]
+TELLING: Final = 0.005
 
 
 class LoggedEvent(NamedTuple):

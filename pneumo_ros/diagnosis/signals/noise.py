@@ -5,22 +5,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import comb
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 
-ORDERS = (2, 3, 4, 5, 6)
-MIN_SAMPLES = 20
-# A chattering command writes a random walk into the pressure, which no difference takes away: of a walk's step s, s / 2
-# stays. Its gain moves with pressure and height, so it is taken out window by window: 0.2 s at 500 Hz, in which the
-# body moves little, and 100 rows for a handful of gains.
-WINDOW = 100  # rows
-LONGEST_DELAY = 25  # rows within which a command's onset is looked for
-ONSET = (0, 1)  # rows after the delay: a delay that is no whole number of samples spreads an onset over two
-ONSET_ORDER = 4
-WORTH = 0.9  # the least of many estimates lies low by itself: a drive that explains less than this is left alone
+ORDERS: Final = (2, 3, 4, 5, 6)  # orders of the differences that noise is estimated from [numerics]
+MIN_SAMPLES: Final = 20  # samples at least [numerics]
+# rows in which a drive's gain counts as constant: 0.2 s at 500 Hz, in which the body moves little, and enough rows
+# for a handful of gains. A chattering command writes a random walk into the pressure, which no difference takes away:
+# of a walk's step s, s / 2 stays [physics]
+WINDOW: Final = 100
+LONGEST_DELAY: Final = 25  # rows within which a command's onset is looked for [taste]
+# Rows after the delay: a delay that is no whole number of samples spreads an onset over two [definition]
+ONSET: Final = (0, 1)
+ONSET_ORDER: Final = 4  # order of the difference in which an onset is looked for [numerics]
+# Share of the estimate that a drive must bring it down to: the least of many estimates lies low by itself [taste]
+WORTH: Final = 0.9
 
 
 def white_noise(

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from pneumo_ros.diagnosis.signals.types import Signals
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import LIMITS, Rig
 
-# A config written with six digits still names the same rig.
-SAME = 1e-5
-# Sensors may be changed between sessions without the rig being another one.
-NOT_THE_RIG = ("displacement_noise", "pressure_noise")
+# Relative difference of two configs that is none: one written with six digits still names the same rig [definition]
+SAME: Final = 1e-5
+# Sensors may be changed between sessions without the rig being another one [definition]
+NOT_THE_RIG: Final = ("displacement_noise", "pressure_noise")
 
 
 def check_pair(fit: Sequence[Signals], holdout: Signals | None = None) -> None:

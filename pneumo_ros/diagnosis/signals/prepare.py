@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 
@@ -26,15 +27,20 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
 
-ROAD, VALVE, DISPLACEMENT = "/road/profile", "/valve/command", "/rig/displacement"
-APPLIED = "/valve/applied"  # what hardware made of the command
-PRESSURE = {"front_pressure": "/rig/front/pressure", "rear_pressure": "/rig/rear/pressure"}
-TOPIC_OF = {name: PRESSURE.get(name, DISPLACEMENT) for name in MEASURED}
-VALVES_OF = {"front_pressure": [0, 2], "rear_pressure": [1, 3]}  # columns of COMMANDS that fill and empty it
-MIN_DURATION = 2.0  # s: about four periods of the body
-SHORT_DURATION = 6.0  # s
-SLOWEST = 0.05  # s between samples of the fastest measured topic
-SLOW = 0.02  # s: fewer than 5 samples a period of wheel hop
+ROAD: Final = "/road/profile"  # topic of the contract [definition]
+VALVE: Final = "/valve/command"  # topic of the contract [definition]
+DISPLACEMENT: Final = "/rig/displacement"  # topic of the contract [definition]
+APPLIED: Final = "/valve/applied"  # topic of what hardware made of the command [definition]
+# Topics of the contract [definition]
+PRESSURE: Final = {"front_pressure": "/rig/front/pressure", "rear_pressure": "/rig/rear/pressure"}
+# topic of each measured channel [definition]
+TOPIC_OF: Final = {name: PRESSURE.get(name, DISPLACEMENT) for name in MEASURED}
+# Columns of COMMANDS that fill and empty it [definition]
+VALVES_OF: Final = {"front_pressure": [0, 2], "rear_pressure": [1, 3]}
+MIN_DURATION: Final = 2.0  # s: about four periods of the body [physics]
+SHORT_DURATION: Final = 6.0  # s, below which intervals are wide, and that is said [taste]
+SLOWEST: Final = 0.05  # s between samples of the fastest measured topic [physics]
+SLOW: Final = 0.02  # s between samples above which there are fewer than 5 in a period of wheel hop [physics]
 
 
 def prepare(

@@ -12,8 +12,9 @@ from pneumo_ros.diagnosis.signals.interruptions import LoggedEvent
 from pneumo_ros.diagnosis.signals.prepare import APPLIED, DISPLACEMENT, PRESSURE, ROAD, VALVE, prepare
 from pneumo_ros.diagnosis.signals.types import Signals, TopicData
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.decoded import CONFIG_TOPIC, Log
 from pneumo_ros.log.inspection import read_events
-from pneumo_ros.log.reading import CONFIG_TOPIC, Log, read_log
+from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.topics import EVENTS
 from pneumo_ros.rig import Rig, parse_rig
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.signals.types import TopicData, TopicTiming
 from pneumo_ros.errors import InputError
 
-BACK_JUMP = 0.1  # s: stamps further back than this are a clock set back, not samples out of order
-INPUT_GAP = 0.25  # s: longer without command or road, the model cannot be driven across
+BACK_JUMP: Final = 0.1  # s: stamps further back than this are a clock set back, not samples out of order [taste]
+INPUT_GAP: Final = 0.25  # s: longer without command or road, the model cannot be driven across [taste]
 
 
 class Monotone(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from pneumo_ros.diagnosis.signals.initial import Initial, estimate_initial
 from pneumo_ros.rig import Rig, channels
 
-MEASURED, COMMANDS, ROADS = channels.CHANNELS, channels.VALVES, channels.ROADS
-NO_VERDICT = "; no verdict."  # ends the sentence of a limitation that forbids one
+MEASURED: Final = channels.CHANNELS  # names of the contract [definition]
+COMMANDS: Final = channels.VALVES  # names of the contract [definition]
+ROADS: Final = channels.ROADS  # names of the contract [definition]
+NO_VERDICT: Final = "; no verdict."  # ends the sentence of a limitation that forbids one [display]
 
 
 class TopicData(NamedTuple):

@@ -4,11 +4,21 @@
 A subsystem whose own run stays close although the whole drifts off is sound; one that leaves the log while everything
 around it is measured holds (part of) the fault. Rates of the fed states are smoothed derivatives: they only feed
 damping and volume change of the simulated subsystem.
+
+Kernel arguments
+----------------
+x, k, dt : state, its rate, and a step, s
+fed, following : measured states (N, 10), or two consecutive rows of them
+part : how far between these two rows, 0..1
+own : (10,) states that are simulated; the others are taken from ``fed``
+start : (10,) first state
+commands, road : (N, 4) openings, m2; (N, 2) heights of the ground, m
+period : s
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -29,7 +39,8 @@ class Subsystem(NamedTuple):
     channels: tuple[int, ...]
 
 
-SUBSYSTEMS = {
+# Parts that can be run alone, with the states they own and the channels that judge them [definition]
+SUBSYSTEMS: Final = {
     "body": Subsystem((0, 1, 4, 5), (0, 1)),
     "front_axle": Subsystem((2, 6), (2,)),
     "rear_axle": Subsystem((3, 7), (3,)),

@@ -5,27 +5,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
+from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, total_gap
 from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.diagnosis.where.design import PARAMETER_STEP, Design, pressure_rates
 from pneumo_ros.diagnosis.where.features import Features
 from pneumo_ros.diagnosis.where.flexible import Basis
 from pneumo_ros.diagnosis.where.locate import Location, Start, locate, spread
-from pneumo_ros.diagnosis.where.solve import REACH, box_minimum
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 
-TARGET = 0.01  # normalised misfit of a free run that is as good as it gets with laws that are not the rig's own
+# Normalised misfit of a free run that is as good as it gets with laws that are not the rig's own [taste]
+TARGET: Final = 0.01
 
-PROMISING = 0.02  # of the squared residual that a place must close alone to be tried in a free run
-TRIED = 4  # places; a free run with parameters polished costs 18 simulations
+PROMISING: Final = 0.02  # share of the squared residual that a place must close alone to be tried in a free run [taste]
+TRIED: Final = 4  # places; a free run with parameters polished costs 18 simulations [numerics]
 
-_COLUMN = {"force": "{end}_force", "air": "{end}_air", "axle": "{end}_tyre", "heave": "body_heave",
+# place that a kind of basis corrects [definition]
+_COLUMN: Final = {"force": "{end}_force", "air": "{end}_air", "axle": "{end}_tyre", "heave": "body_heave",
            "pitch": "body_pitch", "supply": "supply"}  # fmt: skip
 
 

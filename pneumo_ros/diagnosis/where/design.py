@@ -2,12 +2,13 @@
 """The linear problem behind "where": weak residuals of a log, and what each parameter and correction does to them.
 
 Every column is in the unit of its equation; :func:`design_of` divides by what noise and model form explain, so that a
-residual of one is nothing to talk about.
+residual of one (dimensionless) is what a rig without a fault leaves.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
@@ -20,13 +21,15 @@ from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GRAVITY
 
-# Model form: what a rig whose only fault is its tolerances leaves of an equation, relative to the equation's own size.
-# On such rigs (other friction, gas and valve laws, none of them faulty) 0.05 % brings every equation to about one.
-MODEL_FORM = 5e-4
-NOISE_DRAWS = 4
-PARAMETER_STEP = 0.5  # standard deviations
-FIRST_SENSOR_STEP = 0.05  # of a sensor shape
-FEEDS = {
+# Model form: what a rig whose only fault is its tolerances leaves of an equation, relative to the equation's own
+# size. On such rigs (other friction, gas and valve laws, none of them faulty) 0.05 % brings every equation to about
+# one [calibration: rigs with other friction, gas and valve laws and no fault]
+MODEL_FORM: Final = 5e-4
+NOISE_DRAWS: Final = 4  # draws of sensor noise that its residuals are estimated from [numerics]
+PARAMETER_STEP: Final = 0.5  # prior sigmas, forward difference of a parameter [numerics]
+FIRST_SENSOR_STEP: Final = 0.05  # share of a sensor shape's unit, forward difference [numerics]
+# Channels that an equation reads [definition]
+FEEDS: Final = {
     "heave": MEASURED,
     "pitch": MEASURED,
     "front_axle": ("sprung_front", "unsprung_front", "front_pressure"),
@@ -152,7 +155,7 @@ def _noisy(measured: Array, noise: Array, rng: np.random.Generator) -> Array:
 
 
 def model_form(car: HalfCar, features: Features) -> Array:
-    """(6,) what an honest model's laws leave in each equation, in its unit."""
+    """(6,) residual of each equation on a rig without a fault whose laws are not quite the model's, in its unit."""
     body = car.body
     weight = body.sprung_mass * GRAVITY
     arm = 0.5 * (body.front_arm + body.rear_arm)

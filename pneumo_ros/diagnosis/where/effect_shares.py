@@ -10,7 +10,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import scale_of
-from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.model import Model, Record
 from pneumo_ros.effects.parameters import Active
 
 
@@ -55,6 +55,6 @@ def _pieces(model: Model, one: Active) -> list[Active]:
     return [one]
 
 
-def _size(record: Any, difference: Array) -> float:
+def _size(record: Record, difference: Array) -> float:
     value = float(np.mean((difference / scale_of(record)) ** 2))
     return value if np.isfinite(value) else 0.0

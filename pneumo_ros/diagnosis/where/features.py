@@ -2,11 +2,16 @@
 """Local motion and flow at every instant of a log, smoothed: what a correction may depend on.
 
 Velocities and accelerations here only shape corrections; no equation is tested with them.
+
+Kernel arguments
+----------------
+pressure : (N,) absolute, Pa
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numba import njit
@@ -19,8 +24,8 @@ from pneumo_ros.plant.air_spring import Gas, inlet_flow, outlet_flow, pressure_p
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GAS_CONSTANT
 
-SMOOTHING = 0.03  # s, cubic: keeps wheel hop to 1 %, rates to 1 mm/s
-ACCELERATION_SMOOTHING = 0.042  # s, quartic
+SMOOTHING: Final = 0.03  # s, cubic: keeps wheel hop to 1 %, rates to 1 mm/s [physics]
+ACCELERATION_SMOOTHING: Final = 0.042  # s, quartic: the same for accelerations [physics]
 
 
 @dataclass(frozen=True)

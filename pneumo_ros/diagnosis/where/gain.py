@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from pneumo_ros.diagnosis.where.locate import Location, Start, corrected_residua
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 
-EXPLAINED = 1.0  # mean square, null standard deviations, that noise, tolerances and model form leave anyway
-SPAN = 1.0  # s of a block whose mean squares are taken as independent
+# Mean square, null standard deviations, that noise, tolerances and model form leave anyway [definition]
+EXPLAINED: Final = 1.0
+SPAN: Final = 1.0  # s of a block whose mean squares are taken as independent [taste]
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from pneumo_ros.diagnosis.where.locate import Location, corrected_residual
 from pneumo_ros.diagnosis.where.regimes import shows_in
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, UNITS, averaged
 
-BINS = 15
-RISE = 0.02  # s over which a change of opening is taken
+BINS: Final = 15  # points of a measured law [display]
+RISE: Final = 0.02  # s over which a change of opening is taken [taste]
 
 
 @dataclass(frozen=True)

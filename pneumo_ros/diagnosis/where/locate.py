@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,17 @@ from pneumo_ros.diagnosis.where.weak import EQUATIONS
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 
-# Shapes that close less than this of the held-out squared residual do not know the law: its time course decides.
-TRUSTED = 0.5
-MOST_TIME_COURSES = 2  # places with a free time course in one set: three would fit any residual
-# Share of the squared residual that a second time course must close: bumps 40 ms apart leave a few per cent themselves.
-SECOND = 0.1
-# Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops).
-SENSOR_PASSES = 3
-BLOCK = 0.5  # s, longer than the memory of a window, shorter than the body's period
+# share of the held-out squared residual: shapes that close less do not know the law, and its time course decides
+# [taste]
+TRUSTED: Final = 0.5
+MOST_TIME_COURSES: Final = 2  # places with a free time course in one set: three would fit any residual [taste]
+# share of the squared residual that a second time course must close: bumps 40 ms apart leave a few per cent
+# themselves [numerics]
+SECOND: Final = 0.1
+# Gauss-Newton passes on each sensor's error: the first comes within a few per cent, the others settle corners (stops)
+# [numerics]
+SENSOR_PASSES: Final = 3
+BLOCK: Final = 0.5  # s, longer than the memory of a window, shorter than the body's period [physics]
 
 
 @dataclass(frozen=True)

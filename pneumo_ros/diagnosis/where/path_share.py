@@ -9,6 +9,7 @@ put in as forces, moment and flows, so the model moves as the rig did, and the m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -21,8 +22,9 @@ from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 
-PASSES = 4  # the first is the free run; the third is within a few null standard deviations of the log
-CARRIERS = ("body_heave", "body_pitch", "front_tyre", "rear_tyre", "front_air", "rear_air")  # one an equation
+PASSES: Final = 4  # the first is the free run; the third is within a few null standard deviations of the log [numerics]
+# Places whose corrections carry what is missing, one an equation [definition]
+CARRIERS: Final = ("body_heave", "body_pitch", "front_tyre", "rear_tyre", "front_air", "rear_air")
 
 
 def explained(model: RigModel, design: Design, nuisance: Array, active: Sequence[Active]) -> Array:

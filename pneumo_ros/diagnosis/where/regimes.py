@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +15,14 @@ from pneumo_ros.diagnosis.where.design import Design
 from pneumo_ros.diagnosis.where.features import End
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, UNITS
 
-BANDS = (0.0, 1.0, 4.0, 7.0, 12.0, 25.0, 60.0)  # Hz: drift, body, between, wheel hop, above
-LIGHT = 0.3  # of the mean tyre load: below it contact is light
-MIN_WINDOWS = 8
-PERIODIC = 0.9  # share of the road's power in one line and its neighbours
+BANDS: Final = (0.0, 1.0, 4.0, 7.0, 12.0, 25.0, 60.0)  # Hz: drift, body, between, wheel hop, above [physics]
+LIGHT: Final = 0.3  # share of the mean tyre load below which contact is light [taste]
+MIN_WINDOWS: Final = 8  # windows of a regime at least [numerics]
+PERIODIC: Final = 0.9  # share of the road's power in one line and its neighbours from which it is one sine [taste]
 
-# Equation in which a place's fault shows most sharply, and its end (None: take the equation with the largest residual).
-SHOWS_IN = {
+# Equation in which a place's fault shows most sharply, and its end (None: take the equation with the largest
+# residual) [definition]
+SHOWS_IN: Final = {
     "front_force": "front_axle", "rear_force": "rear_axle", "front_air": "front_air", "rear_air": "rear_air",
     "front_tyre": "front_axle", "rear_tyre": "rear_axle", "body_heave": "heave", "body_pitch": "pitch",
     "road_input": "front_axle", "supply": "front_air",

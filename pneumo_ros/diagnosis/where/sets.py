@@ -5,18 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
-# In null standard deviations (rms). Rigs with nothing but tolerances stay below 1.3 whatever laws they are made with,
-# and no single place closes more than a fifth of that.
-FLAT = 1.5
-SINGLED_OUT = 0.3
-LARGEST = 5  # places in a set: two effects at both ends, and one more to see that it is not needed
-# A further place must take this share of what is left (mean square) to be believed.
-WORTH = 0.4
-BOTH_ENDS = tuple((f"front_{part}", f"rear_{part}") for part in ("force", "air", "tyre"))
+# Rms in null standard deviations below which nothing is missing: rigs with nothing but tolerances stay below 1.3,
+# whatever laws they are made with [calibration: bench/locate.py]
+FLAT: Final = 1.5
+# Share of such a level that one place must close to be named: without a fault none closes more than a fifth
+# [calibration: bench/locate.py]
+SINGLED_OUT: Final = 0.3
+LARGEST: Final = 5  # places in a set: two effects at both ends, and one more to see that it is not needed [taste]
+WORTH: Final = 0.4  # share of what is left (mean square) that a further place must close [taste]
+# Places that may act at both ends alike [definition]
+BOTH_ENDS: Final = tuple((f"front_{part}", f"rear_{part}") for part in ("force", "air", "tyre"))
 
 
 class Closing(Protocol):
@@ -27,7 +29,7 @@ class Closing(Protocol):
 
 
 def smallest(closing: Closing, places: Sequence[str], largest: int = LARGEST, least: float = 0.0) -> list[str]:
-    """The smallest set after which further places stop being worth their while.
+    """The smallest set to which no further place adds enough.
 
     A further place must close :data:`WORTH` of what is left, and ``least`` of what was there at first.
     """

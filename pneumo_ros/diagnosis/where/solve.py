@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
+from pneumo_ros.diagnosis.fit.problem import REACH
 
-REACH = 3.0  # standard deviations that a parameter may be off
-# Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough for
-# an effect a hundred times the null, narrow enough that near-copies of a shape do not cancel each other.
-LOOSENESS = 30.0
+# Prior of a shape's size, relative to a shape that moves the residuals by one null standard deviation: wide enough
+# for an effect a hundred times the null, narrow enough that near-copies of a shape do not cancel each other
+# [numerics]
+LOOSENESS: Final = 30.0
 
 
 class Rows(NamedTuple):
@@ -142,30 +143,3 @@ def _bounded(gram: Array, cross: Array, offset: Array) -> Array:
     reduced = gram[:p, :p] - gram[:p, p:] @ eliminated[:, :p]
     z = box_minimum(np.ascontiguousarray(reduced), cross[:p] - gram[:p, p:] @ eliminated[:, p], low, high)
     return np.concatenate([z, eliminated[:, p] - eliminated[:, :p] @ z])
-
-
-@njit(cache=True)
-def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
-    """Minimum of x'Gx/2 - c'x inside a box, by coordinate descent until no coordinate moves by 1e-5.
-
-    Parameters
-    ----------
-    gram : (n, n) G, symmetric with a positive diagonal
-    cross : (n,) c
-    low, high : (n,) bounds of x
-    """
-    x = np.minimum(np.maximum(np.zeros(len(cross)), low), high)
-    gradient = gram @ x - cross
-    for _ in range(3000):
-        moved = 0.0
-        for i in range(len(cross)):
-            new = min(max(x[i] - gradient[i] / gram[i, i], low[i]), high[i])
-            step = new - x[i]
-            if step != 0.0:
-                x[i] = new
-                for j in range(len(cross)):
-                    gradient[j] += gram[j, i] * step
-                moved = max(moved, abs(step))
-        if moved < 1e-5:
-            break
-    return x

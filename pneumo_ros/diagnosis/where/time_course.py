@@ -12,23 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.box import box_minimum
+from pneumo_ros.diagnosis.fit.problem import REACH
 from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.where.design import Design, car_of, inlet_gain, inputs_of
-from pneumo_ros.diagnosis.where.solve import REACH, box_minimum
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, averaged, weak_residuals
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.half_car import HalfCar
 
-REACHED = 3  # windows on each side that a bump of a sensor's time course moves: two of the bump, one of the window
-STEP = 0.05  # of a channel's standard deviation, to carry a time course through the equations
-PRICE = 1.0  # mean square, null standard deviations, that one free value takes of noise
-RIDGE = 1e-6
+# Windows on each side that a bump of a sensor's time course moves: two of the bump, one of the window [numerics]
+REACHED: Final = 3
+# Share of a channel's standard deviation, forward difference that carries a time course through the equations
+# [numerics]
+STEP: Final = 0.05
+PRICE: Final = 1.0  # mean square, null standard deviations squared, that one free value takes of noise [definition]
+RIDGE: Final = 1e-6  # relative, keeps the Gram matrix of time courses regular [numerics]
 
 
 @dataclass

@@ -11,12 +11,18 @@ equation's own unit:
 
 The air balance is used in conservative form, d(m)/dt = W12 - W23 with m = P V / (R T2) (Eqs. 4.13, 4.17, 4.20): it is
 Eq. 4.22 before the chain rule, and holds no derivative but that of the mass.
+
+Kernel arguments
+----------------
+height, pressure : (N,) of a spring, m, and absolute, Pa
+inlet, outlet : (N,) commanded openings, m2
+scale, ambient : factor on the effective area, 1, and absolute pressure, Pa
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -27,10 +33,12 @@ from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, inlet_
 from pneumo_ros.plant.half_car import Body, HalfCar
 from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 
-EQUATIONS = ("heave", "pitch", "front_axle", "rear_axle", "front_air", "rear_air")
-UNITS = ("N", "N m", "N", "N", "kg/s", "kg/s")
-HALF_WIDTH = 0.04  # s: passes what is below about 12 Hz, wheel hop included, at 0.3 N of sensor noise
-SMOOTHNESS = 4  # (1 - s^2)^4: three derivatives vanish at the ends, so sums over samples are as good as integrals
+# the equations of motion and of the air, in the order of the residuals' columns [definition]
+EQUATIONS: Final = ("heave", "pitch", "front_axle", "rear_axle", "front_air", "rear_air")
+UNITS: Final = ("N", "N m", "N", "N", "kg/s", "kg/s")  # of the equations' residuals [definition]
+HALF_WIDTH: Final = 0.04  # s: passes what is below about 12 Hz, wheel hop included, at 0.3 N of sensor noise [physics]
+# (1 - s^2)^4: three derivatives vanish at the ends, so sums over samples are as good as integrals [numerics]
+SMOOTHNESS: Final = 4
 
 
 class Window(NamedTuple):

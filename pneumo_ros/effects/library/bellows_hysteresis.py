@@ -4,6 +4,8 @@
 Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976: z' = v/length (1 - |z|^n)
 while loading, v/length (1 + b |z|^n) while unloading; b 0 unloads elastically (equal constants), b 1 steepest. It
 differs from dry friction by its length: millimetres of travel, not a bristle's tenth.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

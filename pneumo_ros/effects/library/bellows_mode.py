@@ -4,6 +4,8 @@
 q'' = w^2 (h - q) + 2 zeta w ((1 - g) h' - q'); force on the strut -m (w^2 (h - q) + 2 zeta w (1 - g) (h' - q')). The
 share g of the damping is the wall's own stretching, the rest acts between wall and strut: Lagrange's equations of the
 dissipation m zeta w ((1 - g) (h' - q')^2 + g q'^2). Far below w the bellows follow the height.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

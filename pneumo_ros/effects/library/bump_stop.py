@@ -2,6 +2,8 @@
 """A bump stop that meets the strut earlier, or pushes harder, than the nominal one.
 
 k d (1 + a d) (1 - c d(height)/dt) over the depth d: stiffening rubber that loses energy in every contact.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

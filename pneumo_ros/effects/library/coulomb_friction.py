@@ -4,6 +4,8 @@
 Source: Canudas de Wit, Olsson, Astrom, Lischinsky, "A new model for control of systems with friction", IEEE TAC 40(3),
 1995. The bristle state is advanced by its exact solution at held speed, so that the stiffest bristle needs no shorter
 step.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bellows' effective area differs from the table, in size and in its slope over height."""
+"""The bellows' effective area differs from the table, in size and in its slope over height.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 
 dP/dt gains (n - 1)/V hA (T_wall - T), where T follows from the air's mass (a state) by P V = m R T; the wall stays at
 the supply's temperature. Source: energy balance of a control volume; hA 0 leaves the nominal law.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@
 Law 0 is a hole (Eq. 4.11), law 1 a long narrow gap (the laminar mass flow of a gas grows with (P^2 - Pa^2)/T); between
 them a blend.
 The area is that of the hole with the same flow at a reference pressure. No tolerance of the outlet valve scales it.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

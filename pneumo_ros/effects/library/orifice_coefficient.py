@@ -4,6 +4,8 @@
 A sharp-edged orifice's coefficient falls as the flow unchokes, from 0.84 at a deep vacuum downstream to 0.6 for a small
 pressure drop (Perry, Trans. ASME 71, 1949; Eq. 4.7 has a constant), so that an error has a slope over the ratio of the
 pressures. The outlet may share the inlet's error or have none of it: they are two valves.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

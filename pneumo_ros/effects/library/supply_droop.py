@@ -2,6 +2,8 @@
 """The supply's pressure sags with the flow drawn: a tank refilled through a regulator of finite stiffness.
 
 d(drop)/dt = (resistance W - drop)/tau, W the inflow of both springs; the tank is steady at the first instant.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

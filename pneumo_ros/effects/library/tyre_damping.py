@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tyre's rubber damps: a viscous force beside its stiffness (the thesis neglects it)."""
+"""The tyre's rubber damps: a viscous force beside its stiffness (the thesis neglects it).
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
 
 from __future__ import annotations
 

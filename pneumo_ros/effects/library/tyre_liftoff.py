@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A tyre pushes but does not pull: above the ground its force is gone (the nominal tyre is linear in both signs)."""
+"""A tyre pushes but does not pull: above the ground its force is gone (the nominal tyre is linear in both signs).
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
 
 from __future__ import annotations
 

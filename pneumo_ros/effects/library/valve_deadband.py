@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The valve does not answer small commands: overlap near the seat, and a spool that sticks until pulled far enough."""
+"""The valve does not answer small commands: overlap near the seat, and a spool that sticks until pulled far enough.
+
+Kernel arguments
+----------------
+u : (N,) commands, m2
+"""
 
 from __future__ import annotations
 

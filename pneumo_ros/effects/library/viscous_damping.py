@@ -2,6 +2,8 @@
 """The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8).
 
 -c (1 + b |v|) v: b is how much the constant grows, or falls, with speed.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

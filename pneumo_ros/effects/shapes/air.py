@@ -2,6 +2,8 @@
 """Atoms of a spring's air balance: leaks, errors of the orifices, heat from the wall, volume that is not V(h).
 
 A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ Positive upwards on the body. Friction and damping are saturating ramps and powe
 extension and compression; what sticks, and rate-independent hysteresis, are sliders in parallel (Iwan 1966, "A
 distributed-element model for hysteresis and its steady-state dynamic response", J. Appl. Mech. 33): elastic up to their
 slack, then slipping at constant force.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations
@@ -59,7 +61,7 @@ Values = tuple[float, ...]
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _slid(z: float, move: float) -> float:
-    """A slider's stretch over its slack after a move."""
+    """A slider's stretch ``z`` over its slack, -1..1, after a ``move`` in the same unit."""
     return min(max(z + move, -1.0), 1.0)
 
 

@@ -5,6 +5,8 @@ A part of mass m that hangs between both plates by springs: q'' = w^2 (h - q) + 
 between body and axle; each plate gets half of -m q'' and of what it weighs beyond the nominal masses. The law of
 :mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut, where its inertia pushes the plates
 apart; the real ones are anything between the two. No cone: frequency and damping are fitted as well.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _on_each(middle: float, rate: float, z: State, p: Values) -> float:
-    """N upwards on each plate."""
+    """N upwards on each plate; ``middle`` between the plates, m, and its ``rate``, m/s."""
     w = 2.0 * math.pi * p[1]
     return 0.5 * (p[0] * (w * w * (z[0] - middle) + 2.0 * p[2] * w * (z[1] - rate)) - p[3])
 

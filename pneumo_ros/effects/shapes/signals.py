@@ -4,6 +4,10 @@
 A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead
 zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a
 polynomial of its own reading.
+
+Kernel arguments
+----------------
+u, half, held : (N,) signal, half the width of its play, and where the follower stood before, in one unit
 """
 
 from __future__ import annotations

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Atoms of a supply that sags with the flow drawn from it: memories of flow and of its square (a hose, an orifice)."""
+"""Atoms of a supply that sags with the flow drawn from it: memories of flow and of its square (a hose, an orifice).
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness."""
+"""Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness.
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pneumo_ros.log.conformance import Finding, check_conformance
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import Event, Report, Setup, TopicReport, inspect_log
-from pneumo_ros.log.reading import Log
 from pneumo_ros.session.passive import passive_session
 from pneumo_ros.session.picture import draw_session
 from pneumo_ros.session.summary import (

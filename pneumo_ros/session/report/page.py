@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
-from pneumo_ros.log.reading import Log
+from pneumo_ros.log.decoded import Log
 from pneumo_ros.printable import shown
 from pneumo_ros.session.report.contents import contents
 from pneumo_ros.session.summary import Recorded

@@ -118,16 +118,16 @@ def diagnose_tables() -> dict[str, TableDiagnosis]:
 
 def diagnose_table(bench: Bench, table: str) -> TableDiagnosis:
     """One table's competition; ``table`` "frequency" or "damping"."""
-    contest = _Contest(bench, table)
+    comparison = _Comparison(bench, table)
     columns = range(bench.mass.shape[1])
-    judged = sorted((contest.judged(law) for law in LAWS[table]), key=lambda j: j.gap)
+    judged = sorted((comparison.judged(law) for law in LAWS[table]), key=lambda j: j.gap)
     nominal = next(law for law in LAWS[table] if law.id == "nominal")
-    chosen = [contest.chosen([c for c in columns if c != held]) for held in columns]
-    squares = [contest.error(law, [c for c in columns if c != held], held) ** 2 for held, law in enumerate(chosen)]
-    bare = contest.predicted(nominal, np.array([p.nominal for p in NUISANCE[table]]))
+    chosen = [comparison.chosen([c for c in columns if c != held]) for held in columns]
+    squares = [comparison.error(law, [c for c in columns if c != held], held) ** 2 for held, law in enumerate(chosen)]
+    bare = comparison.predicted(nominal, np.array([p.nominal for p in NUISANCE[table]]))
     return TableDiagnosis(
         table,
-        float(np.sqrt(np.mean(np.log(bare / contest.printed) ** 2)) / contest.scale),
+        float(np.sqrt(np.mean(np.log(bare / comparison.printed) ** 2)) / comparison.scale),
         next(j.gap for j in judged if j.law.id == "nominal"),
         tuple(judged),
         tuple(law.id for law in chosen),
@@ -135,7 +135,7 @@ def diagnose_table(bench: Bench, table: str) -> TableDiagnosis:
     )
 
 
-class _Contest:
+class _Comparison:
     """Fits of laws to some columns of a table, remembered."""
 
     def __init__(self, bench: Bench, table: str) -> None:

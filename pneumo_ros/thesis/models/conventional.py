@@ -3,6 +3,14 @@
 
 State (8): heave, pitch, unsprung front and rear [m, rad, m, m], then their rates, all measured from static equilibrium:
 the weight then drops out. Pitch is positive nose up. The printed Eqs. 3.3-3.4 mix both signs of pitch; these do not.
+
+Kernel arguments
+----------------
+body_rate, axle_rate : upwards, m/s
+damping, damping_max, skyhook : of a damper, the most it can give, and skyhook damping, N s/m
+x, x0, k, h : state (8,): heave, pitch, axles, m and rad, then their rates; its rate; a step, s
+road, road_front, road_rear : heights of the ground, m
+period, steps : s, and RK4 steps in it
 """
 
 from __future__ import annotations
@@ -48,7 +56,7 @@ class Conventional(NamedTuple):
 def damper_force(body_rate: float, axle_rate: float, damping: float, skyhook: float, damping_max: float) -> float:
     """Force of one damper on the body, N: passive, or as near to -skyhook * body_rate as a damper can give.
 
-    A damper can only oppose its own motion: where the sky's force would drive it, it gives its least (Section 2.5.3).
+    A damper can only oppose its own motion: where the skyhook force would drive it, it gives its least (Section 2.5.3).
     """
     relative = body_rate - axle_rate
     if skyhook <= 0.0 or body_rate * relative <= 0.0:

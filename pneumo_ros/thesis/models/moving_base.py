@@ -3,6 +3,13 @@
 
 The valves are shut, so the air's mass is constant and its pressure follows the volume: P V^n = const (Eq. 4.18).
 State (2): payload height z [m] and rate; the base moves as amplitude sin(w t).
+
+Kernel arguments
+----------------
+height : of the spring, m
+z, rate, base, base_rate : payload about rest and base, upwards, m and m/s
+frequency, amplitude : of the base, Hz and m
+periods, steps : how many are simulated, and RK4 steps in each
 """
 
 from __future__ import annotations

@@ -4,6 +4,14 @@
 State (5): sprung and unsprung height [m], their rates, spring pressure [Pa absolute]. All z
 upwards from the ground datum.
 Inputs: inlet and outlet opening [m2], held over a period, and road height [m], linear over a period.
+
+Kernel arguments
+----------------
+x, x0 : state (5,): sprung and unsprung height, m, their rates, m/s, absolute pressure, Pa
+a, b, c, d, k : rates of the state
+dt, period, steps : a step, s; a control period, s, and the RK4 steps in it
+inlet, outlet : openings, m2; commands : both, (N, 2)
+road : height of the ground, m, at one instant or at the ends of each period
 """
 
 from __future__ import annotations
@@ -135,7 +143,7 @@ def _moved(x: State, k: State, dt: float) -> State:
 
 @njit(cache=True)
 def _mean(a: State, b: State, c: State, d: State) -> State:
-    """RK4's weighted sum (a + 2b + 2c + d) / 6."""
+    """RK4's weighted sum (a + 2b + 2c + d) / 6, written out like the half car's to stay in registers."""
     s = 1.0 / 6.0
     return (
         s * (a[0] + 2.0 * (b[0] + c[0]) + d[0]),

@@ -3,6 +3,15 @@
 
 As in the thesis the controller knows the true heights, rates and acceleration and one inlet valve acts, held over a
 control period. What it does not know (area, volume, height, mass) is set by :class:`Belief`.
+
+Kernel arguments
+----------------
+states, x, start : (N, 5), (5,) plant state of :mod:`pneumo_ros.thesis.models.quarter_car`
+state : (4,) reference and its two derivatives, m, m/s, m/s2, and the error's integral, m s
+acceleration, area : of the sprung mass, m/s2, and effective area, m2
+a, P : (1,) area over the mean area, and its gain (1, 1)
+mass, damping, ambient : as the estimator believes them, kg, N s/m, Pa
+road, steps : (N + 1,) m, and RK4 steps in a period
 """
 
 from __future__ import annotations

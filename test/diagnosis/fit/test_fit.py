@@ -11,12 +11,13 @@ from helpers.own_logs import QUICK, drawn, driven, log
 from helpers.rig_logs import excitation, signals_of
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, bounded_newton, fit, sensitivities
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
-from pneumo_ros.diagnosis.search.competition import starts_elsewhere
+from pneumo_ros.diagnosis.search.fitting import starts_elsewhere
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, trials, visibility
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel

@@ -15,7 +15,8 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
 from pneumo_ros.diagnosis.fit.solver import fit
 from pneumo_ros.diagnosis.model import EffectLike
-from pneumo_ros.diagnosis.search.competition import Effort, compete
+from pneumo_ros.diagnosis.search.competition import compete
+from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, Parameter
 from pneumo_ros.errors import InputError
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,8 +26,8 @@ DELAY = {"active": [{"effect": "transport_delay", "site": "both", "values": [0.0
 
 
 @pytest.fixture(scope="module")
-def signals(shared: Path) -> Signals:
-    found = read_signals(shared / "logs" / "practice" / "nominal-exact-fit.mcap")
+def signals(practice: Callable[[str], Path]) -> Signals:
+    found = read_signals(practice("nominal-exact-fit"))
     short = {key: getattr(found, key)[:ROWS] for key in ("measured", "weight", "commands", "road")}
     _, trim = nominal_half_car(found.rig)
     return replace(found, **short, start_state=found.start_state._replace(state=np.array(trim.state)))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,9 @@ from pneumo_ros.rig import load_rig
 
 
 @pytest.mark.slow
-def test_lag_of_the_rear_valve_is_named_and_its_gap_closed(shared: Path) -> None:
-    logs = shared / "logs" / "practice"
+def test_lag_of_the_rear_valve_is_named_and_its_gap_closed(practice: Callable[[str], Path]) -> None:
     found = diagnose_files(
-        [logs / "valve-lag-rear-fit.mcap"], logs / "valve-lag-rear-holdout.mcap", options=Options(pairs=False)
+        [practice("valve-lag-rear-fit")], practice("valve-lag-rear-holdout"), options=Options(pairs=False)
     )
     best = found.ranking[0]
     assert found.verdict == "valve_lag" and best.side == "rear" and found.location[0][0] == "rear_air"
@@ -33,12 +33,11 @@ def test_lag_of_the_rear_valve_is_named_and_its_gap_closed(shared: Path) -> None
 
 @pytest.mark.slow
 def test_the_command_line_writes_all_files_and_finds_no_effect_where_there_is_none(
-    shared: Path, tmp_path: Path
+    practice: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    logs = shared / "logs" / "practice"
     arguments = [
-        "diagnose", str(logs / "nominal-within-tolerance-fit.mcap"), "--output", str(tmp_path),
-        "--holdout", str(logs / "nominal-within-tolerance-holdout.mcap"), "--no-pairs",
+        "diagnose", str(practice("nominal-within-tolerance-fit")), "--output", str(tmp_path),
+        "--holdout", str(practice("nominal-within-tolerance-holdout")), "--no-pairs",
         "--save-rig", str(tmp_path / "rig.yaml"),
     ]  # fmt: skip
     result = CliRunner().invoke(app, arguments)
@@ -52,7 +51,7 @@ def test_the_command_line_writes_all_files_and_finds_no_effect_where_there_is_no
     assert saved.tyre_stiffness_front.value != load_rig().tyre_stiffness_front.value
     # The saved rig's own nominal is what the refit was, but for the shift of all commands, which is not the rig's.
     saved_again = prepared(
-        [logs / "nominal-within-tolerance-fit.mcap"], logs / "nominal-within-tolerance-holdout.mcap", saved
+        [practice("nominal-within-tolerance-fit")], practice("nominal-within-tolerance-holdout"), saved
     )
     values = np.array([p.nominal for p in saved_again.model.parameters])
     assert held_out(saved_again.model, saved_again.holdout, values, ()).total == pytest.approx(

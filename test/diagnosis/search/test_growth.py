@@ -12,10 +12,11 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, refreshed, secant
 from pneumo_ros.diagnosis.model import PlainEffect
-from pneumo_ros.diagnosis.search.competition import Effort, compete
+from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.screening import compatible
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 
 ROWS, PERIOD = 4000, 5e-3

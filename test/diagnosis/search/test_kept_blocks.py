@@ -14,8 +14,9 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Problem
 from pneumo_ros.diagnosis.model import EffectLike, PlainEffect
-from pneumo_ros.diagnosis.search.competition import Effort, compete
+from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 
 RATE, STOP, BELOW = 8.0, 30.0, 1.5

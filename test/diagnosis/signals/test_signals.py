@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.practice import OTHER_WRITER
 from helpers.rig_logs import DISPLACEMENT_NOISE, PRESSURE_NOISE, RATE, simulated, topics, write_log
 
 from pneumo_ros.diagnosis.signals import MEASURED, Signals, TopicData, check_pair, prepare, read_signals
@@ -352,8 +353,8 @@ def test_a_file_that_is_no_log_is_refused(tmp_path: Path) -> None:
         read_signals(path)
 
 
-def test_a_truncated_log_is_refused(tmp_path: Path, shared: Path) -> None:
-    whole = (shared / "logs" / "practice" / "nominal-exact-fit.mcap").read_bytes()
+def test_a_truncated_log_is_refused(tmp_path: Path) -> None:
+    whole = OTHER_WRITER.read_bytes()
     path = tmp_path / "cut.mcap"
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"cut\.mcap") as error:
@@ -361,9 +362,9 @@ def test_a_truncated_log_is_refused(tmp_path: Path, shared: Path) -> None:
     assert "\n" not in str(error.value)
 
 
-def test_a_log_of_another_writer_is_read(shared: Path) -> None:
-    signals = read_signals(shared / "logs" / "practice" / "nominal-exact-fit.mcap")
-    assert signals.measured.shape == (7500, 6) and signals.limitations == ()
+def test_a_log_of_another_writer_is_read() -> None:
+    signals = read_signals(OTHER_WRITER)
+    assert signals.measured.shape == (1101, 6)
     assert signals.rig.name == "half-car-2m2a" and signals.period == 0.002
 
 

@@ -3,16 +3,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.practice import labels
 from helpers.rig_logs import channels_of, excitation, noisy, signals_of, simulated, topics_of_channels
 from scipy.optimize import lsq_linear
 
+from pneumo_ros.diagnosis.fit.box import box_minimum
 from pneumo_ros.diagnosis.signals import MEASURED, Signals, TopicData, prepare, read_signals
 from pneumo_ros.diagnosis.where import (
     Start,
@@ -28,7 +29,7 @@ from pneumo_ros.diagnosis.where.locate import corrected_residual
 from pneumo_ros.diagnosis.where.path_share import explained
 from pneumo_ros.diagnosis.where.regimes import bands, harmonics, regimes
 from pneumo_ros.diagnosis.where.sets import best_subset, rivals, shapley, smallest
-from pneumo_ros.diagnosis.where.solve import Rows, box_minimum, forms_of
+from pneumo_ros.diagnosis.where.solve import Rows, forms_of
 from pneumo_ros.diagnosis.where.weak import EQUATIONS, Inputs, make_windows, weak_residuals
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.parameters import Active
@@ -353,11 +354,10 @@ def true_places(label: dict) -> set[str]:  # type: ignore[type-arg]
 
 
 @pytest.mark.slow
-def test_the_practice_logs_are_located_exactly(shared: Path) -> None:
+def test_the_practice_logs_are_located_exactly(practice: Callable[[str], Path]) -> None:
     """Made by other software with other laws: each pair's places and no others; flat where nothing is wrong."""
-    folder = shared / "logs" / "practice"
-    for label in json.loads((folder / "labels.json").read_text()):
-        fit, holdout = (read_signals(folder / f"{label['name']}-{part}.mcap") for part in ("fit", "holdout"))
+    for label in labels():
+        fit, holdout = (read_signals(practice(f"{label['name']}-{part}")) for part in ("fit", "holdout"))
         location = locate(RigModel(fit.rig), [fit], holdout)
         assert set(location.chosen) == true_places(label), label["name"]
         assert location.flat == (not true_places(label)), label["name"]

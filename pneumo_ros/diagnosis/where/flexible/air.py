@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pneumo_ros.diagnosis.where.features import Features, lagged, resonated
 from pneumo_ros.diagnosis.where.flexible.basis import Basis
 
-LAGS = (0.004, 0.012, 0.03, 0.1)  # s
-VALVES = (150.0, 50.0)  # rad/s
-MEMORIES = (0.1, 0.5, 2.0)  # s of heat exchange
-SHARE = 0.1  # of the flow that a shape of size one stands for
+LAGS: Final = (0.004, 0.012, 0.03, 0.1)  # s, of the valve [taste]
+VALVES: Final = (150.0, 50.0)  # rad/s, natural frequency of the valve [taste]
+MEMORIES: Final = (0.1, 0.5, 2.0)  # s of heat exchange [taste]
+SHARE: Final = 0.1  # share of the flow that a shape of size one stands for [numerics]
 
 
 def air_bases(features: Features, i: int) -> list[Basis]:

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-# What a correction's series is added to; ``column`` 0 front, 1 rear, or the channel's column.
-KINDS = ("force", "air", "axle", "heave", "pitch", "supply", "road", "sensor")
+# What a correction's series is added to; ``column`` 0 front, 1 rear, or the channel's column [definition]
+KINDS: Final = ("force", "air", "axle", "heave", "pitch", "supply", "road", "sensor")
 
 
 class Basis(NamedTuple):

@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pneumo_ros.diagnosis.where.features import Features, dragged, lagged, resonated
 from pneumo_ros.diagnosis.where.flexible.basis import Basis
 
-FRICTION = 10.0  # N, size of a friction shape
-STIFFNESS = 2000.0  # N/m
-DAMPING = 100.0  # N s/m
-SPEEDS = (0.005, 0.02, 0.06, 0.2)  # m/s at which friction saturates
-SLACKS = (5e-5, 3e-4, 1.5e-3)  # m of creep before slip
-MEMORIES = (0.02, 0.1, 0.5)  # s
-MODES = (40.0, 60.0, 80.0, 100.0, 130.0, 170.0)  # rad/s of a bellows mode: between the body's and what a window passes
+FRICTION: Final = 10.0  # N, size of a friction shape [numerics]
+STIFFNESS: Final = 2000.0  # N/m, size of an elastic shape [numerics]
+DAMPING: Final = 100.0  # N s/m, size of a damping shape [numerics]
+SPEEDS: Final = (0.005, 0.02, 0.06, 0.2)  # m/s at which friction saturates [taste]
+SLACKS: Final = (5e-5, 3e-4, 1.5e-3)  # m of creep before slip [taste]
+MEMORIES: Final = (0.02, 0.1, 0.5)  # s, of a force that relaxes [taste]
+# rad/s of a bellows mode: between the body's frequency and what a window passes [physics]
+MODES: Final = (40.0, 60.0, 80.0, 100.0, 130.0, 170.0)
 
 
 def force_bases(features: Features, i: int) -> list[Basis]:

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pneumo_ros.diagnosis.where.features import Features, lagged
 from pneumo_ros.diagnosis.where.flexible.basis import Basis
 
-ROAD_LAGS = (0.005, 0.02, 0.06)  # s
-SUPPLY_LAGS = (0.05, 0.3, 2.0)  # s
-DROOP = 2e4  # Pa
+ROAD_LAGS: Final = (0.005, 0.02, 0.06)  # s, of the exciter [taste]
+SUPPLY_LAGS: Final = (0.05, 0.3, 2.0)  # s, of the supply [taste]
+DROOP: Final = 2e4  # Pa, size of a shape of the supply [numerics]
 
 
 def road_bases(features: Features) -> list[Basis]:

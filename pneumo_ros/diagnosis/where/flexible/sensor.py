@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.where.features import Features, lagged
 from pneumo_ros.diagnosis.where.flexible.basis import Basis
 
-LAGS = (0.005, 0.02, 0.08)  # s; the last for gauge lines
-SHARE = 0.1
+LAGS: Final = (0.005, 0.02, 0.08)  # s; the last one for gauge lines [taste]
+SHARE: Final = 0.1  # share of a channel's swing that a shape of size one stands for [numerics]
 
 
 def sensor_bases(features: Features) -> list[Basis]:

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from pneumo_ros.diagnosis.where.features import Features, lagged
 from pneumo_ros.diagnosis.where.flexible.basis import Basis
 
-STIFFNESS = 1000.0  # N/m
-DAMPING = 20.0  # N s/m
-LAGS = (0.005, 0.02, 0.1)  # s
+STIFFNESS: Final = 1000.0  # N/m, size of an elastic shape [numerics]
+DAMPING: Final = 20.0  # N s/m, size of a damping shape [numerics]
+LAGS: Final = (0.005, 0.02, 0.1)  # s, of a force that relaxes [taste]
 
 
 def tyre_bases(features: Features, i: int) -> list[Basis]:

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from pneumo_ros.casemaker.plan import plan
-from pneumo_ros.cli.blind_batch import run_all
 from pneumo_ros.cli.blind_work import make_case
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.reading import read_log
+from pneumo_ros.workers import run_each
 
 CASES = plan("ci")[:2]
 
@@ -36,21 +36,21 @@ def fail(folder: str) -> None:
 
 
 def test_a_killed_local_worker_costs_a_restart_only(tmp_path: Path) -> None:
-    outcomes = dict(run_all(die_once, [str(tmp_path)], workers=2))
+    outcomes = dict(run_each(die_once, [str(tmp_path)], workers=2))
     assert outcomes == {str(tmp_path): ""}
     assert (tmp_path / "done").exists()
 
 
 def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path: Path) -> None:
     (tmp_path / "tried").touch()
-    assert list(run_all(fail, ["x", "y"])) == [("x", "ValueError: x"), ("y", "ValueError: y")]
-    assert list(run_all(die_once, [str(tmp_path)])) == [(str(tmp_path), "")]
+    assert list(run_each(fail, ["x", "y"])) == [("x", "ValueError: x"), ("y", "ValueError: y")]
+    assert list(run_each(die_once, [str(tmp_path)])) == [(str(tmp_path), "")]
 
 
 def test_no_scheduler_is_one_line() -> None:
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="no scheduler answers"):
-        list(run_all(fail, ["x"], scheduler="tcp://127.0.0.1:1"))
+        list(run_each(fail, ["x"], scheduler="tcp://127.0.0.1:1"))
 
 
 @pytest.mark.slow
@@ -61,7 +61,7 @@ def test_two_cases_on_a_dask_cluster_with_a_worker_killed(tmp_path: Path) -> Non
         killer = threading.Thread(target=_kill_when_busy, args=(pids[0], tmp_path / "cases"))
         killer.start()
         items = [(case, str(tmp_path)) for case in CASES]
-        outcomes = dict(run_all(make_case, items, scheduler=cluster.scheduler_address))
+        outcomes = dict(run_each(make_case, items, scheduler=cluster.scheduler_address))
         killer.join()
         assert pids[0] not in [worker.pid for worker in cluster.workers.values()]
     assert sorted(item[0].name for item in outcomes) == sorted(case.name for case in CASES)
@@ -87,6 +87,6 @@ def _assert_complete(folder: Path) -> None:
             assert log.config is not None
             assert log.topics["/road/profile"].count == 7500
     before = {path: path.stat().st_mtime for path in (folder / "cases").rglob("*.mcap")}
-    assert all(error == "" for _, error in run_all(make_case, [(case, str(folder)) for case in CASES]))
+    assert all(error == "" for _, error in run_each(make_case, [(case, str(folder)) for case in CASES]))
     after = {path: path.stat().st_mtime for path in (folder / "cases").rglob("*.mcap")}
     assert before == after, "finished cases are not made again"

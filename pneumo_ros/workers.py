@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run many independent pieces of work: over local processes, or over a Dask cluster. Results are files."""
+"""Many independent pieces of work over local processes, or over a Dask cluster: results in order, or left in files."""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -12,11 +13,26 @@ from typing import TypeVar
 from pneumo_ros.errors import InputError
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
 Outcome = tuple[Item, str]  # item and '' or what went wrong
 RESTARTS = 3  # a worker that dies (killed, out of memory) costs a new pool, not the run
+FEW = 64  # pieces below which starting processes costs more than it saves
 
 
-def run_all(
+def run_in_order(function: Callable[[Item], Result], items: Sequence[Item], workers: int | None = None) -> list[Result]:
+    """``function`` of every item, on ``workers`` processes (all cores by default); the first exception ends it.
+
+    ``function`` must live at module level. Threads would do for compiled code, were it not that numba holds the
+    interpreter lock.
+    """
+    count = workers or os.cpu_count() or 1
+    if count == 1 or len(items) < FEW:
+        return [function(item) for item in items]
+    with _pool(count) as pool:
+        return list(pool.map(function, items, chunksize=max(1, len(items) // (4 * count))))
+
+
+def run_each(
     work: Callable[[Item], object], items: Sequence[Item], workers: int = 1, scheduler: str | None = None
 ) -> Iterator[Outcome[Item]]:
     """Yield (item, error) as pieces finish, in any order.
@@ -34,6 +50,11 @@ def run_all(
         yield from ((item, _attempt(work, item)) for item in items)
     else:
         yield from _over_processes(work, items, workers)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Fresh interpreters: a fork would copy locks and threads of libraries in whatever state they are."""
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
 
 
 def _attempt(work: Callable[[Item], object], item: Item) -> str:
@@ -59,7 +80,7 @@ def _over_processes(work: Callable[[Item], object], items: Sequence[Item], worke
 
 
 def _one_pool(work: Callable[[Item], object], items: Sequence[Item], workers: int) -> Iterator[Outcome[Item]]:
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with _pool(workers) as pool:
         futures = {pool.submit(_attempt, work, item): item for item in items}
         for future in as_completed(futures):
             yield futures[future], future.result()

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is made of a finished session: tables, picture, page."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import typer
+
+from pneumo_ros.cli.terminal import Console
+
+if TYPE_CHECKING:
+    from pneumo_ros.session.plan import Values
+    from pneumo_ros.session.summary import Recorded
+
+
+class Wanted(NamedTuple):
+    """What is made of a finished session."""
+
+    summary: bool
+    picture: bool
+    page: bool
+
+
+def report_unless_asked_to_end(console: Console, target: Path, values: Values, wanted: Wanted) -> None:
+    """The session and its log are done; who asks again to end gets no report."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        _report(console, target, values, wanted)
+    except KeyboardInterrupt:
+        console.print(f"no report was made; log {target}")
+        raise typer.Exit from None
+
+
+def _report(console: Console, target: Path, values: Values, wanted: Wanted) -> None:
+    """Table of the active run beside passive valves on the same road, the picture and the page."""
+    from pneumo_ros.cli.passive import passive_run
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.rig import load_rig
+    from pneumo_ros.session.summary import load_session
+
+    if not any(wanted):
+        console.print(f"log      {target}", soft_wrap=True)
+        return
+    session = load_session(target)
+    other = passive_run(session, load_rig(str(values["road_profile"].get("rig", "")) or None))
+    if wanted.summary:
+        _summarise(console, target, session, other)
+    console.print(f"log      {target}", soft_wrap=True)
+    if wanted.picture:
+        from pneumo_ros.session.picture import draw_session
+
+        png = target.with_suffix(".png")
+        draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
+        console.print(f"picture  {png}", soft_wrap=True)
+    if wanted.page:
+        from pneumo_ros.session.report import write_report
+
+        html = target.with_suffix(".html")
+        write_report(read_log(target), html, other)
+        console.print(f"report   {html}", soft_wrap=True)
+
+
+def _summarise(console: Console, target: Path, session: Recorded, other: Recorded | None) -> None:
+    """Tables of ride and loops, and what a reader must be warned of."""
+    from pneumo_ros.cli.tables import summary_table, timing_table
+    from pneumo_ros.log.reading import read_log
+    from pneumo_ros.session.summary import loop_timing, summarise, wall_time
+    from pneumo_ros.session.warnings import warnings_of
+
+    loop = loop_timing(target)
+    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
+    console.print(summary_table(ours, summarise(other) if other is not None else None))
+    console.print(timing_table(ours))
+    for line in ours.warnings:
+        console.print(f"[yellow]warning[/]  {line}", highlight=False, soft_wrap=True)

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From screened candidates to fits: the order they are tried in, short fits, and fits to convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Final
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.search.screening import CandidateScore
+from pneumo_ros.diagnosis.search.state import Effort, Search
+from pneumo_ros.effects.parameters import EffectParameter
+
+PROBE: Final = 5  # iterations of the fit of a probed candidate [numerics]
+
+
+def rescued(problem: Problem, state: Fit, iterations: int) -> Fit:
+    """The fit, or, where its free run failed, the better one that starts from short windows."""
+    if not free_run_failed(problem, state):
+        return state
+    other = fit_from_windows(problem, state.candidate, state.x, iterations)
+    return state if other is None or not other.cost < state.cost else other
+
+
+def varied(screened: Sequence[CandidateScore], count: int, sites: int) -> list[CandidateScore]:
+    """Those with the best scores, but not more than a few sites of one effect, so that rivals of another kind get their
+    chance.
+    """
+    taken: list[CandidateScore] = []
+    for one in screened:
+        kind = [effect for effect, _ in one.parts]
+        if sum([effect for effect, _ in p.parts] == kind for p in taken) < sites:
+            taken.append(one)
+        if len(taken) == count:
+            break
+    return taken
+
+
+def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> list[CandidateScore]:
+    """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
+    those end at: the screening is linear, and a typical size may be far from the true one.
+    """
+    own = problem.values(base.candidate, base.x)
+    ranked = []
+    for entry in screened:
+        candidate = Candidate((*base.candidate.parts, *entry.parts))
+        start = problem.start(candidate, base.x[: problem.fixed], [*own, *entry.values])
+        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
+        values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
+        ranked.append((one.cost, entry if one.diverged else replace(entry, values=values)))
+    return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
+
+
+def short_fits(search: Search, base: Fit, chosen: Sequence[CandidateScore], span: tuple[float, float]) -> list[Fit]:
+    """Each chosen candidate on top of the base, fitted for ``effort.short`` iterations, lowest training cost first;
+    those that diverge are noted in ``search.lost``. ``span`` : share of the whole search done before and after.
+    """
+    problem, out = search.problem, []
+    for k, entry in enumerate(chosen):
+        candidate = Candidate((*base.candidate.parts, *entry.parts))
+        search.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
+        values = [*problem.values(base.candidate, base.x), *entry.values]
+        start = problem.start(candidate, base.x[: problem.fixed], values)
+        one = fit(problem, candidate, start, base.jacobian, iterations=search.effort.short, shared=len(base.x))
+        one = rescued(problem, one, search.effort.short)
+        if one.diverged:
+            search.lost.append(candidate.label)
+        else:
+            out.append(one)
+    return by_cost(out)
+
+
+def finished(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = None) -> Fit:
+    """To convergence, from where the short fit ended; with a fit to start ``anew`` from, also from its effect's other
+    shapes and signs there; the best.
+    """
+    best = fit(problem, short.candidate, short.x, None, iterations=effort.long)
+    parameters = problem.effect_parameters(short.candidate)
+    if anew is None or all(p.size for p in parameters):
+        return best
+    for values in starts_elsewhere(parameters, problem.values(best.candidate, best.x)):
+        # Not from where this fit ended: its tolerance parameters have adapted to the shape it has.
+        start = problem.start(short.candidate, anew.x[: problem.fixed], values)
+        other = fit(problem, short.candidate, start, anew.jacobian, iterations=effort.anew)
+        if other.cost < best.cost - 1.0:
+            best = fit(problem, short.candidate, other.x, None, iterations=effort.long)
+    return best
+
+
+def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> list[list[float]]:
+    """Starts away from where a fit ended: each shape at its further starts, and each size with the other sign."""
+    out = []
+    for k, p in enumerate(parameters):
+        if not p.size:
+            out += [[value if m == k else float(v) for m, v in enumerate(found)] for value in p.starts]
+            continue
+        other = [value for value in (p.typical, *p.starts) if value * found[k] < 0.0][:1]
+        out += [[value if m == k else q.typical for m, q in enumerate(parameters)] for value in other]
+    return out
+
+
+def by_cost(fits: Iterable[Fit]) -> list[Fit]:
+    """Fits, lowest training cost first."""
+    return sorted(fits, key=lambda f: f.cost)

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How much a search fits, and its state: what has been fitted so far, ending as its result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from pneumo_ros.diagnosis.fit.problem import Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.search.screening import CandidateScore
+from pneumo_ros.diagnosis.search.selection import PARAMETER_PENALTY, used_unknowns
+
+Progress = Callable[[float, str], None]  # share done 0..1, what is being done
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is fitted; more of each finds rarer combinations and costs time in proportion.
+
+    Attributes
+    ----------
+    singles : singles that get a short fit
+    finalists : singles fitted to convergence
+    seconds : second effects tried on the first, second, ... leader
+    blind_pairs : pairs taken from the screening at the refit
+    pair_finalists : pairs fitted to convergence
+    probes : second effects probed on each leader
+    exchanged : rivals probed in place of each effect of the best pair
+    short, anew, long : iterations of a short fit, of one from another shape, of a full one
+    """
+
+    singles: int = 10
+    finalists: int = 5
+    seconds: tuple[int, ...] = (6, 4, 2)
+    blind_pairs: int = 3
+    pair_finalists: int = 3
+    probes: int = 24
+    exchanged: int = 6
+    short: int = 6
+    anew: int = 5
+    long: int = 10
+
+
+@dataclass
+class Search:
+    """The state of a competition; ends as its result.
+
+    Attributes
+    ----------
+    logged : the problem with the command's jumps where the logs have them
+    problem : the same as last timed
+    refit : the nominal structure re-estimated
+    singles, pairs : fits, best training cost first; the first ``finalists`` of each have converged
+    structures : leading ones with the shapes of their families, and those that grew from them
+    screened : screening of the singles at the refit, for the report
+    lost : labels of candidates whose fit diverged
+    visible : effect id -> rms in sigmas that its typical size would move the outputs by
+    """
+
+    logged: Problem
+    problem: Problem
+    refit: Fit
+    effort: Effort
+    progress: Progress
+    singles: list[Fit] = field(default_factory=list)
+    pairs: list[Fit] = field(default_factory=list)
+    structures: list[Fit] = field(default_factory=list)
+    screened: list[CandidateScore] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+    visible: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def finalists(self) -> list[Fit]:
+        """Every converged structure; of those with the same laws, with and without shapes, the one of lowest price."""
+        best: dict[tuple[Part, ...], Fit] = {}
+        for one in (*self.laws, *self.structures):
+            rival = best.get(one.candidate.laws)
+            if rival is None or _price(one) < _price(rival):
+                best[one.candidate.laws] = one
+        return list(best.values())
+
+    @property
+    def laws(self) -> list[Fit]:
+        """Converged singles and pairs by their laws alone."""
+        return self.singles[: self.effort.finalists] + self.pairs[: self.effort.pair_finalists]
+
+    @property
+    def best(self) -> Fit:
+        """Lowest training cost of all."""
+        return min([self.refit, *self.finalists], key=lambda f: f.cost)
+
+
+def _price(one: Fit) -> float:
+    """Training cost with the penalty of what was fitted, and a little for each shape: a law that does as well wins."""
+    return one.cost + PARAMETER_PENALTY * used_unknowns(one) + len(one.candidate.shapes)

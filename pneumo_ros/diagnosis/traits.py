@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What records, models and effects may have beyond the least that a diagnosis asks of them: one protocol each.
+
+The least stands in :mod:`pneumo_ros.diagnosis.model`. Whoever wants one of these asks with ``isinstance``, so that a
+misspelt property is an error of types and not a silent default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.effects.parameters import Derived, EffectParameter
+
+if TYPE_CHECKING:
+    from pneumo_ros.diagnosis.fit.pace import Pace
+    from pneumo_ros.diagnosis.signals.types import Limitation
+
+
+@runtime_checkable
+class HasModelForm(Protocol):
+    """A record whose rig's maker states what the model form is worth."""
+
+    @property
+    def model_form(self) -> float:
+        """Share of each channel's std below which no difference is called an effect; 0 where nothing is stated."""
+
+
+@runtime_checkable
+class HasSlowNoise(Protocol):
+    """A record part of whose noise wanders, so that averaging does not lessen it."""
+
+    @property
+    def slow_noise(self) -> Array:
+        """(C,) standard deviation of that part."""
+
+
+@runtime_checkable
+class HasScale(Protocol):
+    """A record that knows the std of its channels over its real samples."""
+
+    @property
+    def scale(self) -> Array:
+        """(C,)."""
+
+
+@runtime_checkable
+class HasPace(Protocol):
+    """A record with lengths of its own."""
+
+    @property
+    def pace(self) -> Pace: ...
+
+
+@runtime_checkable
+class HasLimits(Protocol):
+    """A record that may forbid a verdict."""
+
+    @property
+    def limitations(self) -> Sequence[Limitation]: ...
+
+    @property
+    def blocked(self) -> bool:
+        """Whether a limitation forbids a verdict."""
+
+
+@runtime_checkable
+class HasCoarse(Protocol):
+    """A model that makes records of half the rate, for sensitivities."""
+
+    def coarse(self, record: Any) -> Any:
+        """Every other row."""
+
+
+@runtime_checkable
+class HasChanges(Protocol):
+    """A model that sees what the configuration of another record states differently."""
+
+    def changes(self, record: Any) -> dict[str, float]:
+        """Factor on each parameter that differs, by name."""
+
+
+@runtime_checkable
+class HasDerived(Protocol):
+    """An effect whose parameters give further quantities together."""
+
+    @property
+    def derived(self) -> Sequence[Derived]: ...
+
+
+@runtime_checkable
+class HasSiteParameters(Protocol):
+    """An effect whose parameters differ from site to site."""
+
+    @property
+    def by_site(self) -> Mapping[str, tuple[EffectParameter, ...]]: ...
