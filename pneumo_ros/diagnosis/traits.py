@@ -54,6 +54,15 @@ class HasPace(Protocol):
 
 
 @runtime_checkable
+class IsScreened(Protocol):
+    """A shape whose atoms may be tried alone."""
+
+    @property
+    def screened(self) -> bool:
+        """Whether they are: its family's law does nothing like them."""
+
+
+@runtime_checkable
 class HasLimits(Protocol):
     """A record that may forbid a verdict."""
 

@@ -176,15 +176,20 @@ class Problem:
         """(n,) samples that the fit sees; the others are for selection."""
         return self.block % SELECT_EVERY != self.fold
 
+    @cached_property
+    def parameters_of(self) -> dict[Part, tuple[EffectParameter, ...]]:
+        """Parameters of each effect where it may act."""
+        return {(e.id, site): parameters_at(e, site) for e in self.model.effects.values() for site in e.sites}
+
     def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
         """Parameters of all its effects, in order."""
-        return tuple(p for effect, site in candidate.parts for p in parameters_at(self.model.effects[effect], site))
+        return tuple(p for part in candidate.parts for p in self.parameters_of[part])
 
     def active(self, candidate: Candidate, values: Array) -> tuple[Active, ...]:
         """Its effects with values (SI)."""
         out, first = [], 0
         for effect, site in candidate.parts:
-            count = len(parameters_at(self.model.effects[effect], site))
+            count = len(self.parameters_of[effect, site])
             out.append(Active(effect, site, tuple(float(v) for v in values[first : first + count])))
             first += count
         return tuple(out)

@@ -23,7 +23,7 @@ from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
 from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit
 from pneumo_ros.diagnosis.judge.held_out import free_run
-from pneumo_ros.diagnosis.search.growth import restricted
+from pneumo_ros.diagnosis.search.fitting import restricted
 from pneumo_ros.effects.parameters import Active, family_of
 
 DRAWS: Final = 200  # bootstrap draws of an interval [numerics]

@@ -19,7 +19,7 @@ from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import HasCurves
 from pneumo_ros.diagnosis.result import BudgetEntry, Remainder
-from pneumo_ros.diagnosis.search.growth import of_law
+from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.effects.parameters import Active, Curve, family_of
 
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]

@@ -20,7 +20,16 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
-from pneumo_ros.diagnosis.search.fitting import by_cost, finished, probed, rescued, short_fits, varied
+from pneumo_ros.diagnosis.search.fitting import (
+    by_cost,
+    finished,
+    of_law,
+    probed,
+    rescued,
+    restricted,
+    short_fits,
+    varied,
+)
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
@@ -130,12 +139,12 @@ def _run_pairs(search: Search) -> None:
     short: list[Fit] = []
     for k, (single, count) in enumerate(zip(search.singles, effort.seconds, strict=False)):
         leader = refreshed(problem, single)
-        part = leader.candidate.parts[0]
-        others = [p for p in all_parts(problem) if compatible(problem.model, part, p)]
+        own = leader.candidate.parts
+        others = [p for p in all_parts(problem) if compatible(problem.model, own[0], p)]
         screened = candidate_scores(problem, leader, trials(problem, leader, others))
         screened = probed(problem, leader, varied(screened, effort.probes, 3))
         span = (0.65 + 0.05 * k, 0.7 + 0.05 * k)
-        short += short_fits(search, leader, unseen(screened, (part,), count), span)
+        short += short_fits(search, leader, unseen(screened, own, count), span)
     found = trials(problem, search.refit, all_parts(problem))
     blind = unseen(candidate_scores(problem, search.refit, found, pairs=True), (), effort.blind_pairs)
     short = by_cost(short + short_fits(search, search.refit, blind, (0.8, 0.85)))
@@ -153,15 +162,16 @@ def _exchange_each(search: Search) -> None:
     if not search.pairs:
         return
     pair = search.pairs[0]
-    for k, part in enumerate(pair.candidate.parts):
-        kept = pair.candidate.parts[1 - k]
-        alone = refreshed(problem, fit(problem, *_alone(problem, pair, kept), pair.jacobian, iterations=1))
+    for law in pair.candidate.laws:
+        bare = Candidate(tuple(part for part in pair.candidate.parts if part not in of_law(pair.candidate, law)))
+        alone = refreshed(problem, fit(problem, bare, restricted(problem, pair, bare), pair.jacobian, iterations=1))
         if alone.diverged:  # without the other effect
             continue
-        rivals = [p for p in all_parts(problem) if _rivals(problem, part, p) and compatible(problem.model, kept, p)]
+        (kept,) = bare.laws
+        rivals = [p for p in all_parts(problem) if _rivals(problem, law, p) and compatible(problem.model, kept, p)]
         tried = {frozenset(f.candidate.parts) for f in search.pairs[: effort.pair_finalists]}
         screened = candidate_scores(problem, alone, trials(problem, alone, rivals))
-        fresh = [p for p in screened if frozenset((kept, *p.parts)) not in tried][: effort.exchanged]
+        fresh = [p for p in screened if frozenset((*bare.parts, *p.parts)) not in tried][: effort.exchanged]
         for short in short_fits(search, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
             search.pairs = by_cost([*search.pairs[: effort.pair_finalists], finished(problem, short, effort)])
 
@@ -178,25 +188,14 @@ def _typical(problem: Problem, part: Part) -> Array:
     return np.array([p.typical for p in problem.effect_parameters(Candidate((part,)))])
 
 
-def _alone(problem: Problem, pair: Fit, part: Part) -> tuple[Candidate, Array]:
-    """One effect of a pair, and the unknowns it has there."""
-    candidate, first = Candidate((part,)), 0
-    for one in pair.candidate.parts:
-        count = len(problem.effect_parameters(Candidate((one,))))
-        if one == part:
-            values = problem.values(pair.candidate, pair.x)[first : first + count].tolist()
-            return candidate, problem.start(candidate, pair.x[: problem.fixed], values)
-        first += count
-    raise AssertionError(f"{part} is no part of {pair.candidate.label}")
-
-
 def _try_without_each(search: Search) -> None:
     """Each effect of the best pair alone, from the pair's values: a start that no screening of singles has seen."""
     problem, pair = search.problem, search.pairs[0] if search.pairs else None
     if pair is None:
         return
-    for part in pair.candidate.parts:
-        candidate, start = _alone(problem, pair, part)
+    for law in pair.candidate.laws:
+        candidate = Candidate(of_law(pair.candidate, law))
+        start = restricted(problem, pair, candidate)
         start[: problem.fixed] = search.refit.x[: problem.fixed]
         alone = fit(problem, candidate, start, search.refit.jacobian, iterations=search.effort.long)
         before = min((f.cost for f in search.finalists if f.candidate == candidate), default=np.inf)

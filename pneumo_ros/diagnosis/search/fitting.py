@@ -7,13 +7,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
+import numpy as np
+
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.shooting import fit_from_windows, free_run_failed
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.search.screening import CandidateScore
 from pneumo_ros.diagnosis.search.state import Effort, Search
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import EffectParameter, family_of
 
 PROBE: Final = 5  # iterations of the fit of a probed candidate [numerics]
 
@@ -44,15 +46,18 @@ def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> l
     """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
     those end at: the screening is linear, and a typical size may be far from the true one.
     """
-    own = problem.values(base.candidate, base.x)
-    ranked = []
-    for entry in screened:
-        candidate = Candidate((*base.candidate.parts, *entry.parts))
-        start = problem.start(candidate, base.x[: problem.fixed], [*own, *entry.values])
-        one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
-        values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
-        ranked.append((one.cost, entry if one.diverged else replace(entry, values=values)))
+    ranked = [probed_one(problem, base, entry) for entry in screened]
     return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
+
+
+def probed_one(problem: Problem, base: Fit, entry: CandidateScore) -> tuple[float, CandidateScore]:
+    """Training cost of a screened candidate after :data:`PROBE` cheap steps, and the candidate with its values then."""
+    own = problem.values(base.candidate, base.x)
+    candidate = Candidate((*base.candidate.parts, *entry.parts))
+    start = problem.start(candidate, base.x[: problem.fixed], [*own, *entry.values])
+    one = fit(problem, candidate, start, base.jacobian, iterations=PROBE, probe=True, shared=len(base.x))
+    values = tuple(float(v) for v in problem.values(candidate, one.x)[len(own) :])
+    return one.cost, entry if one.diverged else replace(entry, values=values)
 
 
 def short_fits(search: Search, base: Fit, chosen: Sequence[CandidateScore], span: tuple[float, float]) -> list[Fit]:
@@ -106,3 +111,18 @@ def starts_elsewhere(parameters: Sequence[EffectParameter], found: Array) -> lis
 def by_cost(fits: Iterable[Fit]) -> list[Fit]:
     """Fits, lowest training cost first."""
     return sorted(fits, key=lambda f: f.cost)
+
+
+def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
+    """A law with its family's shape at the same site."""
+    return tuple(p for p in candidate.parts if p[1] == law[1] and family_of(p[0]) == family_of(law[0]))
+
+
+def restricted(problem: Problem, one: Fit, candidate: Candidate) -> Array:
+    """The unknowns of a structure that another, smaller one has as well."""
+    own, first = {}, problem.fixed
+    for part in one.candidate.parts:
+        count = len(problem.effect_parameters(Candidate((part,))))
+        own[part] = one.x[first : first + count]
+        first += count
+    return np.concatenate([one.x[: problem.fixed], *(own[part] for part in candidate.parts)])

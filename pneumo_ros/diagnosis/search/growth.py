@@ -18,8 +18,8 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.competition import room_for_more
-from pneumo_ros.diagnosis.search.fitting import probed, short_fits, varied
-from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, restricted, short_fits, varied
+from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
 from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
@@ -28,14 +28,13 @@ MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = (3, 2)  # leading singles and pairs that are fitted with their shapes [numerics]
 SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
 COUNTS: Final = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
-EXCHANGED: Final = (8, 1, 1)  # the same for each effect that is exchanged [numerics]
+EXCHANGED: Final = (6, 3)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
-MISFIT: Final = 4.0  # mean square on the kept blocks, sigma squared, above which a structure is wrong [taste]
-MISFIT_OF_REFIT: Final = 0.01  # the same as a share of the refit's [taste]
+MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which a structure is wrong [taste]
+MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 # Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
 STEP: Final = 0.3
-EXCHANGES: Final = 3  # times that no addition helps and exchanges are tried [numerics]
-MISSED_LEAST: Final = 3  # effects that are then tried for exchange [numerics]
+EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
 STEPS: Final = 5  # iterations of a fit without some parts [numerics]
 IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without being missed [taste]
 
@@ -58,24 +57,29 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
 
 def _climb(search: Search, start: Scored, evident: float) -> None:
     """Structures of ever more effects, by floating search (Pudil, Novovicova, Kittler 1994, Pattern Recognition Letters
-    15, 1119-1125): after each addition, an effect that the others have made needless goes, and what has room then may
-    come; where no addition helps, one is exchanged. ``evident`` is the gain that a further effect must bring at last.
+    15, 1119-1125): after each addition, an effect that the others have made needless goes, one that another serves
+    better is exchanged, and what has room then may come. ``evident`` is the gain that a further effect must bring at
+    last.
     """
-    problem, worth, exchanges = search.problem, STEP * evident, EXCHANGES
+    problem, worth = search.problem, STEP * evident
+    misfit = max(MISFIT, MISFIT_OF_REFIT * score(problem, search.refit).level)
 
     def price(one: Fit) -> float:
         return score(problem, one).price
 
-    misfit = max(MISFIT, MISFIT_OF_REFIT * score(problem, search.refit).level)
-    current, known = start.fit, {start.size: start.price}
+    current, known, exchanges = start.fit, {start.size: start.price}, EXCHANGES
     for number in range(ROUNDS):
         search.progress(0.84 + 0.05 * number / ROUNDS, f"beside {current.candidate.label}")
-        size = len(current.candidate.laws)
-        found = _one_more(search, current) if size < MOST else []
+        while exchanges and score(problem, current).level > misfit:
+            other = _one_exchanged(search, current)
+            exchanges -= 1
+            if other is None or price(other) > price(current) - worth:
+                break
+            search.structures.append(other)
+            current = other
+            known[len(current.candidate.laws)] = price(current)
+        found = _one_more(search, current) if len(current.candidate.laws) < MOST else []
         if not found or min(map(price, found)) > price(current) - worth:
-            wrong = exchanges > 0 and score(problem, current).level > misfit
-            found, exchanges = _one_exchanged(search, current, worth) if wrong else [], exchanges - 1
-        if not found:
             break
         search.structures += found
         current = min(found, key=price)
@@ -96,16 +100,26 @@ def _one_less(problem: Problem, found: Fit) -> Fit | None:
     return None if best.diverged else reduced(problem, best, (), STEPS)
 
 
-def _one_exchanged(search: Search, found: Fit, worth: float) -> list[Fit]:
-    """The structure with one of its effects exchanged for what helps more, those it misses least first."""
+def _one_exchanged(search: Search, found: Fit) -> Fit | None:
+    """The structure with the one of its effects exchanged, for another or for another site, that promises most.
+
+    What is left without each effect is screened for what may take its place, and the likeliest of all these together
+    are probed: the effect that a structure misses least need not be the wrong one.
+    """
     problem = search.problem
-    without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws]
-    usable = sorted((one for one in without if not one.diverged and one.candidate.laws), key=lambda one: one.cost)
-    for bare in usable[:MISSED_LEAST]:
-        other = _one_more(search, bare, EXCHANGED)
-        if other and score(problem, other[0]).price < score(problem, found).price - worth:
-            return other
-    return []
+    chosen: list[tuple[float, CandidateScore, Fit]] = []
+    for law in found.candidate.laws:
+        bare = reduced(problem, found, of_law(found.candidate, law), 2)
+        if bare.diverged:
+            continue
+        others = [part for part in _compatible(problem, bare.candidate.laws) if part != law]
+        screened = varied(candidate_scores(problem, bare, trials(problem, bare, others)), EXCHANGED[0], 2)
+        probes = [(*probed_one(problem, bare, one), bare) for one in screened]
+        chosen += sorted(probes, key=lambda item: item[0])[:1]
+    chosen = sorted(chosen, key=lambda item: item[0])[: EXCHANGED[1]]
+    short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
+    ended = [with_shapes(problem, one, search.effort.short) for one in short]
+    return min(ended, key=lambda one: score(problem, one).price, default=None)
 
 
 def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
@@ -155,16 +169,6 @@ def reduced(
     return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
 
 
-def restricted(problem: Problem, one: Fit, candidate: Candidate) -> np.ndarray:
-    """The unknowns of a structure that another, smaller one has as well."""
-    own, first = {}, problem.fixed
-    for part in one.candidate.parts:
-        count = len(problem.effect_parameters(Candidate((part,))))
-        own[part] = one.x[first : first + count]
-        first += count
-    return np.concatenate([one.x[: problem.fixed], *(own[part] for part in candidate.parts)])
-
-
 def _selected(search: Search, limits: Thresholds) -> Scored:
     problem = search.problem
     return select(score(problem, search.refit), [score(problem, f) for f in search.finalists], limits)
@@ -173,14 +177,18 @@ def _selected(search: Search, limits: Thresholds) -> Scored:
 def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
     """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end."""
     problem, effort = search.problem, search.effort
-    laws = base.candidate.laws
-    others = [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
     leader = refreshed(problem, base)
+    others = _compatible(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
     chosen = probed(problem, leader, screened)[: counts[1]]
     short = short_fits(search, leader, chosen, (0.86, 0.86))
     ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long) for one in short[: counts[2]]]
     return [with_shapes(problem, one, effort.short) for one in ended]
+
+
+def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
+    """What may act beside all of them."""
+    return [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
 
 
 def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
@@ -203,18 +211,11 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
         search.structures.append(found)
 
 
-def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
-    """A law with its family's shape at the same site."""
-    return tuple(p for p in candidate.parts if p[1] == law[1] and family_of(p[0]) == family_of(law[0]))
-
-
 def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
     problem, effort = search.problem, search.effort
     bare = refreshed(problem, bare)
-    others = bare.candidate.laws
-    able = (p for p in all_parts(problem) if all(compatible(problem.model, other, p) for other in others))
-    rivals = [part for part in able if _rival(problem, law, part)]
+    rivals = [part for part in _compatible(problem, bare.candidate.laws) if _rival(problem, law, part)]
     screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(search, bare, probed(problem, bare, screened)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)

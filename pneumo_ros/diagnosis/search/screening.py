@@ -21,7 +21,8 @@ from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, HUBER, Fit, robust_scale
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.effects.parameters import Active, EffectParameter, family_of, is_law
+from pneumo_ros.diagnosis.traits import IsScreened
+from pneumo_ros.effects.parameters import SHAPE, Active, EffectParameter, family_of, is_law
 
 SENSOR: Final = "sensor:"  # how the contract's places of sensors begin [definition]
 # Share of the typical size of a second start: an effect may be saturated at its typical size already [taste]
@@ -46,9 +47,9 @@ class CandidateScore:
 
 @dataclass(frozen=True)
 class Trial:
-    """An effect at a site with start values and the change of the residual it makes, (n, C)."""
+    """An effect at a site, with or without its family's shape, start values and the change of the residual, (n, C)."""
 
-    part: Part
+    parts: tuple[Part, ...]
     values: tuple[float, ...]
     change: Array
 
@@ -75,19 +76,38 @@ def all_parts(problem: Problem) -> list[Part]:
 
 
 def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
-    """Simulate each part at each start on top of a fit; what diverges or moves nothing is left out."""
+    """Simulate each part at each start on top of a fit, coarsely where that will do; what diverges or moves nothing is
+    left out.
+    """
     own = list(problem.values(base.candidate, base.x))
+    here = problem.predict_coarse(base.candidate, base.x)
 
-    def tried(what: tuple[Part, tuple[float, ...]]) -> Trial | None:
-        part, values = what
-        candidate = Candidate((*base.candidate.parts, part))
+    def tried(what: tuple[tuple[Part, ...], tuple[float, ...]]) -> Trial | None:
+        added, values = what
+        candidate = Candidate((*base.candidate.parts, *added))
         x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
-        change = problem.residual(candidate, x) - base.residual
+        with np.errstate(over="ignore", invalid="ignore"):
+            change = (here - problem.predict_coarse(candidate, x)) * problem.weight
+        if not np.all(np.isfinite(change)):  # what is too stiff for coarse steps
+            change = problem.residual(candidate, x) - base.residual
         seen = np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6
-        return Trial(part, values, change) if seen else None
+        return Trial(added, values, change) if seen else None
 
-    starts = [(p, v) for p in parts for v in start_values(problem.effect_parameters(Candidate((p,))))]
+    starts = [start for part in parts for start in _starts(problem, part)]
     return [trial for trial in problem.each(tried, starts) if trial is not None]
+
+
+def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[float, ...]]]:
+    """Starts of a law; and of its family's shape beside the law at nothing, one atom each, where that is screened."""
+    own = problem.parameters_of[part]
+    out: list[tuple[tuple[Part, ...], tuple[float, ...]]] = [((part,), values) for values in start_values(own)]
+    shape = (f"{family_of(part[0])}.{SHAPE}", part[1])
+    effect = problem.model.effects.get(shape[0])
+    if isinstance(effect, IsScreened) and effect.screened:
+        still, atoms = [0.0 if p.size else p.typical for p in own], problem.parameters_of[shape]
+        for k in range(len(atoms)):
+            out.append(((part, shape), (*still, *(p.typical if m == k else 0.0 for m, p in enumerate(atoms)))))
+    return out
 
 
 def candidate_scores(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[CandidateScore]:
@@ -116,7 +136,8 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     count = float(np.count_nonzero(problem.weight[problem.fitted]))
     out = dict.fromkeys(filter(is_law, problem.model.effects), 0.0)
     for trial, square in zip(found, np.diag(gram), strict=True):
-        out[trial.part[0]] = max(out[trial.part[0]], float(np.sqrt(max(square, 0.0) / count)))
+        name = trial.parts[0][0]
+        out[name] = max(out[name], float(np.sqrt(max(square, 0.0) / count)))
     return out
 
 
@@ -131,8 +152,8 @@ def _candidate_scores(
     for k in np.argsort(-share, kind="stable"):
         if share[k] <= 0.0:
             break
-        parts = tuple(found[m].part for m in members[k])
-        if parts in best or (pairs and not compatible(problem.model, *parts)):
+        parts = tuple(part for m in members[k] for part in found[m].parts)
+        if parts in best or (pairs and not compatible(problem.model, *(found[m].parts[0] for m in members[k]))):
             continue
         values = [_scaled(problem, found[m], s) for m, s in zip(members[k], sizes[k], strict=True)]
         best[parts] = CandidateScore(parts, tuple(v for one in values for v in one), float(min(1.0, share[k] / total)))
@@ -152,7 +173,7 @@ def compatible(model: Model, one: Part, other: Part) -> bool:
 
 def _signed(problem: Problem, trial: Trial) -> bool:
     """Whether its sizes may as well be negative."""
-    return all(p.low < 0.0 for p in problem.effect_parameters(Candidate((trial.part,))) if p.size)
+    return all(p.low < 0.0 for p in problem.effect_parameters(Candidate(trial.parts)) if p.size)
 
 
 def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
@@ -160,7 +181,7 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
     believed.
     """
     factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
-    parameters = problem.effect_parameters(Candidate((trial.part,)))
+    parameters = problem.effect_parameters(Candidate(trial.parts))
     return tuple(
         float(np.clip(v * factor, p.low, p.high)) if p.size else v
         for v, p in zip(trial.values, parameters, strict=True)

@@ -3,7 +3,7 @@
 
 A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead
 zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a
-polynomial of its own reading.
+polynomial of its own reading; its zero creeps from where it stood when the log began, by exponentials of every length.
 
 Kernel arguments
 ----------------
@@ -44,6 +44,8 @@ SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
 SHARE = 0.3
 PRESSURE_MIDDLE, PRESSURE_SWING = 3.5e5, 5e4  # Pa absolute
 LVDT_SWING = 0.02  # m
+CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
+LVDT_CREEP, PRESSURE_CREEP = 1e-3, 5e3  # m, Pa: where a creeping zero typically ends
 
 
 def _lag(tau: float) -> Filter:
@@ -145,6 +147,21 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swin
     return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo)
 
 
+def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> Effect:
+    def outputs(
+        given: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
+    ) -> tuple[Array, Memory]:
+        begun = 0.0 if memory is None else memory
+        time = begun + period * np.arange(len(given))
+        moved = sum(v * (1.0 - np.exp(-time / tau)) for v, tau in zip(values, CREEPS, strict=True))
+        given[:, channels] += np.reshape(moved, (-1, 1))
+        return given, begun + period * len(given)
+
+    atoms = [Atom(f"creep {tau:g} s", unit, typical, signed=True) for tau in CREEPS]
+    parameters = tuple(amplitude(atom) for atom in atoms)
+    return Effect(name, "a zero that creeps", sites, (), parameters, outputs=outputs, screened=True)
+
+
 LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
 ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c in PLAYS)]
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
@@ -158,6 +175,8 @@ EFFECTS = (
     Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),
            (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
             *_shares([f"lag {t:g} s" for t in EXCITER_LAGS])), inputs=_exciter),
+    _creeping("lvdt_offset.shape", DISPLACEMENTS, LVDT_CREEP, "m"),
+    _creeping("pressure_offset.shape", PRESSURES_OR_BOTH, PRESSURE_CREEP, "Pa"),
     _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, 0.0, LVDT_SWING,
             (1, 2, 3), (), "m"),
     _sensor("pressure_scale.shape", "a sensitivity that is off, or not constant", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
