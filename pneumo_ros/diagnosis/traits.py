@@ -55,11 +55,11 @@ class HasPace(Protocol):
 
 @runtime_checkable
 class IsScreened(Protocol):
-    """A shape whose atoms may be tried alone."""
+    """A shape of which some parameters may be tried alone."""
 
     @property
-    def screened(self) -> bool:
-        """Whether they are: its family's law does nothing like them."""
+    def screened(self) -> tuple[int, ...]:
+        """Which are: the family's law does nothing like them."""
 
 
 @runtime_checkable

@@ -85,7 +85,7 @@ class Effect:
     plant, inputs, outputs, term : hooks, see the module
     guide : what people want to know of it
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
-    screened : of a shape, whether its atoms are tried alone as well: its family's law does nothing like them
+    screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
     """
 
     id: str
@@ -102,7 +102,7 @@ class Effect:
     guide: Guide | None = field(default=None, compare=False)
     slot: str = ""
     columns: tuple[int, ...] = ()
-    screened: bool = False
+    screened: tuple[int, ...] = ()
 
     @property
     def place_in_kernel(self) -> str:

@@ -103,9 +103,9 @@ def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[
     out: list[tuple[tuple[Part, ...], tuple[float, ...]]] = [((part,), values) for values in start_values(own)]
     shape = (f"{family_of(part[0])}.{SHAPE}", part[1])
     effect = problem.model.effects.get(shape[0])
-    if isinstance(effect, IsScreened) and effect.screened:
+    if isinstance(effect, IsScreened):
         still, atoms = [0.0 if p.size else p.typical for p in own], problem.parameters_of[shape]
-        for k in range(len(atoms)):
+        for k in effect.screened:
             out.append(((part, shape), (*still, *(p.typical if m == k else 0.0 for m, p in enumerate(atoms)))))
     return out
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Atoms of a spring's air balance: leaks, errors of the orifices, heat from the wall, volume that is not V(h).
 
-A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q.
+A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q; an exponent n - D for slow strokes is
+a heat of D/(n - 1) P dV/dt (Quaglia and Sorli 2001).
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -26,6 +27,7 @@ USUAL = 1e-3  # kg/s, a valve's usual flow
 MIDDLE = 1.8 * INCH  # m
 SWING = 5e-3  # m
 HEAT_CAPACITY = 1005.0  # J/(kg K), of air at constant pressure
+SLOW = (0.05, 0.2)  # m/s, rates of the strut below which the exponent is lower
 MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
 
 ATOMS = (
@@ -45,6 +47,7 @@ ATOMS = (
     Atom("volume over height", "1", 0.03, signed=True),
     Atom("volume over pressure", "1", 0.03, signed=True),
     Atom("constant", "kg/s", 3e-5, signed=True),
+    *(Atom(f"exponent {v:g} m/s", "1", 0.03) for v in SLOW),
 )
 State = tuple[float, float, float, float]
 Values = tuple[float, ...]
@@ -83,8 +86,10 @@ def air(air: Air, z: State, p: Values) -> float:
     heat += p[11] * (z[1] - t) + p[12] * (z[2] - t) + p[13] * (z[3] - t)
     heat += p[14] * HEAT_CAPACITY * air.inflow * (air.supply_temperature - t)
     through = GAS_CONSTANT * t
-    nominal = air.exponent * (through * (air.inflow - air.outflow) - air.pressure * MEAN_AREA * air.rate) / air.volume
+    squeezed, v = air.pressure * MEAN_AREA * air.rate, air.rate * air.rate
+    nominal = air.exponent * (through * (air.inflow - air.outflow) - squeezed) / air.volume
     extra = p[15] + p[16] * (air.height - MIDDLE) / SWING + p[17] * (pressure - 1.0)
+    heat += (p[19] / (1.0 + v / 0.0025) + p[20] / (1.0 + v / 0.04)) * squeezed / (air.exponent - 1.0)
     return (air.exponent * through * flow + (air.exponent - 1.0) * heat) / air.volume - extra * nominal
 
 
@@ -92,7 +97,12 @@ AIR = Term("air", PlantTerm(states=4, start=start, advance=advance, air=air), AT
 EFFECTS = (
     AIR.shape("leak", ["leak"], "a leak of any law: grows with the pressure"),
     AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),
-    AIR.shape("heat_transfer", ["wall", "enthalpy"], "heat from the wall and with the inflow, of any law"),
+    AIR.shape(
+        "heat_transfer",
+        ["wall", "enthalpy", "exponent"],
+        "heat from the wall and with the inflow, of any law",
+        alone="exponent",
+    ),
     AIR.shape("dead_volume", ["volume"], "a volume that is not V(h), of any law"),
     AIR.anything(),
 )

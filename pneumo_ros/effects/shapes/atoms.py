@@ -9,7 +9,7 @@ a place may use them all with either sign: the ceiling of what can be closed the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import Effect
@@ -51,10 +51,13 @@ class Term:
     sites: tuple[str, ...]
     places: tuple[str, ...]
 
-    def shape(self, family: str, names: Sequence[str], summary: str) -> Effect:
-        """The shape of a family: its atoms by name, or by the first word of their names."""
+    def shape(self, family: str, names: Sequence[str], summary: str, alone: str = "") -> Effect:
+        """The shape of a family: its atoms by name, or by the first word of their names; those that begin with
+        ``alone`` are tried alone as well.
+        """
         columns = tuple(k for k, atom in enumerate(self.atoms) if atom.name in names or atom.name.split()[0] in names)
-        return self._effect(f"{family}.shape", columns, summary, every_sign=False)
+        screened = tuple(n for n, k in enumerate(columns) if alone and self.atoms[k].name.startswith(alone))
+        return replace(self._effect(f"{family}.shape", columns, summary, every_sign=False), screened=screened)
 
     def anything(self) -> Effect:
         """Every atom with either sign."""

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Atoms of what happens to a signal on its way: valves, exciter and sensors.
 
-A slow part is a mixture of lags and delays with nonnegative shares (an impulse response of one sign); a dead
-zone takes away ramps that end at a corner, and what a play of some width does not pass; a sensor's error is a
-polynomial of its own reading; its zero creeps from where it stood when the log began, by exponentials of every length.
+A slow part is a mixture of lags and delays with nonnegative shares, and one follower whose rate limit and two lags are
+fitted (mixtures of limits are not like a limit between them); a dead zone takes away ramps that end at a corner, and
+what a play of some width does not pass; a sensor's error is a polynomial of its own reading; its
+zero creeps from where it stood when the log began, by exponentials of every length.
 
 Kernel arguments
 ----------------
 u, half, held : (N,) signal, half the width of its play, and where the follower stood before, in one unit
+up, down, most : share of the way that a follower goes in one sample, and how far it goes at most
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -41,10 +44,12 @@ CORNERS = (2e-8, 6e-8, 1.5e-7, 4e-7)  # m2
 PLAYS = (2e-8, 8e-8, 2e-7)  # m2, half width
 EXCITER_LAGS = (0.002, 0.006, 0.02)  # s
 SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
+WAYS = ("rising", "falling")
 SHARE = 0.3
 PRESSURE_MIDDLE, PRESSURE_SWING = 3.5e5, 5e4  # Pa absolute
 LVDT_SWING = 0.02  # m
 CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
+CREEPS_TRIED = (1, 3)  # which of them are tried alone
 LVDT_CREEP, PRESSURE_CREEP = 1e-3, 5e3  # m, Pa: where a creeping zero typically ends
 
 
@@ -77,6 +82,29 @@ def _play(half: float) -> Filter:
     return passed
 
 
+@njit(cache=True)
+def _followed(u: Array, up: float, down: float, most: float, held: float) -> Array:
+    y = np.empty_like(u)
+    for i in range(u.shape[0]):
+        step = u[i] - held
+        step *= up if step > 0.0 else down
+        held += min(max(step, -most), most)
+        y[i] = held
+    return y
+
+
+def _follow(slew: float, rising: float, falling: float) -> Filter:
+    """A part of first order, with a lag on the way up and another on the way down, no faster than ``slew``."""
+
+    def passed(u: Array, period: float, memory: Memory) -> tuple[Array, Memory]:
+        up, down = (1.0 - math.exp(-period / tau) for tau in (rising, falling))
+        held = float(u[0]) if memory is None else memory
+        y = _followed(np.ascontiguousarray(u), up, down, slew * period, held)
+        return y, float(y[-1])
+
+    return passed
+
+
 def _corner(end: float) -> Filter:
     return lambda u, period, memory: (u - np.minimum(u, end), None)
 
@@ -96,32 +124,38 @@ def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParam
     return tuple(EffectParameter(n, "1", low, 2.0, SHARE, size=True, spread=10.0) for n in names)
 
 
-def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool) -> Effect:
+def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
+           follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
+    """A valve's shape; a follower's share, rate limit and lags come last."""
+
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
         columns = [c for end in ends.columns for c in ((end,) if inlets_only else (end, 2 + end))]
+        count = len(names) + (1 if follower else 0)
+        shares, own = values[:count], [*filters, *([_follow(*values[count:])] if follower else [])]
         commands, memory = by_column(
-            lambda u, kept: mixed(filters, u, period, values, kept), given.commands, columns, memory
+            lambda u, kept: mixed(own, u, period, shares, kept), given.commands, columns, memory
         )
         return given._replace(commands=np.maximum(commands, 0.0)), memory
 
-    parameters = _shares(names, name.startswith("anything"))
+    parameters = (*_shares(names, name.startswith("anything")), *follower)
     return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs)
 
 
 def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
-    filters = [_line(t) for t in EXCITER_LAGS]
+    gain, *shares = values[: 2 + len(EXCITER_LAGS)]
+    filters = [*(_line(t) for t in EXCITER_LAGS), _follow(*values[-3:])]
 
     def driven(u: Array, kept: Memory) -> tuple[Array, Memory]:
-        out, kept = mixed(filters, u, period, values[1:], kept)
-        return out + values[0] * u, kept
+        out, kept = mixed(filters, u, period, tuple(shares), kept)
+        return out + gain * u, kept
 
     road, memory = by_column(driven, given.road, ends.columns, memory)
     return given._replace(road=road), memory
 
 
 def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swing: float, powers: Sequence[int],
-            lags: Sequence[float], unit: str) -> Effect:  # fmt: skip
-    filters, count = [_line(t) for t in lags], len(powers)
+            lags: Sequence[float], follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
+    count, some = len(powers), len(powers) + len(lags) + (1 if follower else 0)
 
     def error(x: Array, values: Values) -> Array:
         z = (x - middle) / swing
@@ -130,8 +164,10 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swin
     def outputs(
         given: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
     ) -> tuple[Array, Memory]:
+        filters = [*(_line(t) for t in lags), *([_follow(*values[some:])] if follower else [])]
+
         def shown(x: Array, kept: Memory) -> tuple[Array, Memory]:
-            late, kept = mixed(filters, x, period, values[count:], kept)
+            late, kept = mixed(filters, x, period, values[count:some], kept)
             return late + error(x, values), kept
 
         return by_column(shown, given, channels, memory)
@@ -143,7 +179,8 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swin
 
     atoms = [Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers]
     every_sign = name.startswith("anything")
-    parameters = (*(amplitude(atom) for atom in atoms), *_shares([f"lag {t:g} s" for t in lags], every_sign))
+    own = _shares([f"lag {t:g} s" for t in lags], every_sign)
+    parameters = (*(amplitude(atom) for atom in atoms), *own, *follower)
     return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo)
 
 
@@ -159,7 +196,19 @@ def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> E
 
     atoms = [Atom(f"creep {tau:g} s", unit, typical, signed=True) for tau in CREEPS]
     parameters = tuple(amplitude(atom) for atom in atoms)
-    return Effect(name, "a zero that creeps", sites, (), parameters, outputs=outputs, screened=True)
+    return Effect(name, "a zero that creeps", sites, (), parameters, outputs=outputs, screened=CREEPS_TRIED)
+
+
+def _follower(unit: str, slew: float, fastest: float) -> tuple[EffectParameter, ...]:
+    """Share of a follower, its rate limit and its lags; at ``fastest`` the limit is none."""
+    return (
+        *_shares(["follower"]),
+        EffectParameter("slew", unit, 0.1 * slew, fastest, slew, ends=(fastest,), spread=10.0),
+        *(
+            EffectParameter(f"{way} lag", "s", 1e-4, 0.2, 0.01, ends=(1e-4,), spread=10.0)
+            for way in ("rising", "falling")
+        ),
+    )
 
 
 LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
@@ -167,24 +216,25 @@ ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c i
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 EFFECTS = (
-    _valve("valve_lag.shape", "a slow valve of any law: lags of every length", [*LAG_NAMES, DELAY_NAMES[0]],
-           [*SLOW, LATE[0]], False),
+    _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
+           [*LAG_NAMES, DELAY_NAMES[0]], [*SLOW, LATE[0]], False, _follower("m2/s", 1.5e-6, 3e-5)),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
     Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),
            (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
-            *_shares([f"lag {t:g} s" for t in EXCITER_LAGS])), inputs=_exciter),
+            *_shares([f"lag {t:g} s" for t in EXCITER_LAGS]), *_follower("m/s", 0.06, 1.0)),
+           inputs=_exciter),
     _creeping("lvdt_offset.shape", DISPLACEMENTS, LVDT_CREEP, "m"),
     _creeping("pressure_offset.shape", PRESSURES_OR_BOTH, PRESSURE_CREEP, "Pa"),
     _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, 0.0, LVDT_SWING,
-            (1, 2, 3), (), "m"),
+            (1, 2, 3), ()),
     _sensor("pressure_scale.shape", "a sensitivity that is off, or not constant", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
-            PRESSURE_SWING, (0, 1, 2), (), "Pa"),
+            PRESSURE_SWING, (0, 1, 2), ()),
     _sensor("pressure_lag.shape", "a late pressure sensor of any law", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
-            PRESSURE_SWING, (), SENSOR_LAGS, "Pa"),
+            PRESSURE_SWING, (), SENSOR_LAGS, _follower("Pa/s", 5e5, 1e7)),
     _sensor("anything.lvdt", "whatever the sensor does", DISPLACEMENTS, 0.0, LVDT_SWING, (0, 1, 2, 3),
-            SENSOR_LAGS[1:3], "m"),
+            SENSOR_LAGS[1:3]),
     _sensor("anything.pressure", "whatever the sensor does", PRESSURES_OR_BOTH, PRESSURE_MIDDLE, PRESSURE_SWING,
-            (0, 1, 2, 3), SENSOR_LAGS, "Pa"),
+            (0, 1, 2, 3), SENSOR_LAGS),
 )  # fmt: skip
