@@ -119,7 +119,8 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     """How many parameters of its effects, or of some parts, ended at an end of their allowed range.
 
     A size counts whole: nothing of the kind is so large. What only shapes a law counts half, another law may bend it;
-    and so does a law's size beside its family's shape, which can do the same and may push it anywhere.
+    and so does a law's size beside its family's shape, which can do the same and may push it anywhere. What bends a
+    shape counts nothing: it stands for laws that nobody knows.
     """
     free, values, found = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x), 0.0
     first = 0
@@ -128,7 +129,8 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
         stuck = [p for k, p in enumerate(own, first) if not free[k] and not _natural(p, values[k])]
         if parts is None or part in parts:
             beside = is_law(part[0]) and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-            found += sum(1.0 if p.size and not beside else 0.5 for p in stuck)
+            bent = 0.5 if is_law(part[0]) else 0.0
+            found += sum((0.5 if beside else 1.0) if p.size else bent for p in stuck)
         first += len(own)
     return found
 

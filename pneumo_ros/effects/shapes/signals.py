@@ -47,7 +47,7 @@ SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
 WAYS = ("rising", "falling")
 SHARE = 0.3
 PRESSURE_MIDDLE, PRESSURE_SWING = 3.5e5, 5e4  # Pa absolute
-LVDT_SWING = 0.02  # m
+LVDT_SWING = 0.01  # m
 CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
 CREEPS_TRIED = (1, 3)  # which of them are tried alone
 LVDT_CREEP, PRESSURE_CREEP = 1e-3, 5e3  # m, Pa: where a creeping zero typically ends
@@ -178,10 +178,11 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swin
         return measured
 
     atoms = [Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers]
+    alone = tuple(k for k, power in enumerate(powers) if power > 1)  # a scale that is off does nothing like them
     every_sign = name.startswith("anything")
     own = _shares([f"lag {t:g} s" for t in lags], every_sign)
     parameters = (*(amplitude(atom) for atom in atoms), *own, *follower)
-    return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo)
+    return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo, screened=alone)
 
 
 def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> Effect:
@@ -230,7 +231,7 @@ EFFECTS = (
     _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, 0.0, LVDT_SWING,
             (1, 2, 3), ()),
     _sensor("pressure_scale.shape", "a sensitivity that is off, or not constant", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
-            PRESSURE_SWING, (0, 1, 2), ()),
+            PRESSURE_SWING, (0, 1, 2, 3), ()),
     _sensor("pressure_lag.shape", "a late pressure sensor of any law", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
             PRESSURE_SWING, (), SENSOR_LAGS, _follower("Pa/s", 5e5, 1e7)),
     _sensor("anything.lvdt", "whatever the sensor does", DISPLACEMENTS, 0.0, LVDT_SWING, (0, 1, 2, 3),
