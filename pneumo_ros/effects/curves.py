@@ -120,8 +120,10 @@ def curve_of(
         found = lambda parts: _openings(model, record, parts)  # noqa: E731
     elif outputs:
         unit = "m" if own[0].site.startswith(("sprung", "unsprung")) else "Pa"
-        x, y = Axis("true value", unit), Axis("error of the reading", unit)
-        found = lambda parts: _errors(model, record, parts)  # noqa: E731
+        creeps = family.endswith("offset")  # a zero moves with time, a scale with what is read
+        x = Axis("time since the log began", "s") if creeps else Axis("true value", unit)
+        y = Axis("error of the reading", unit)
+        found = lambda parts: _errors(model, record, parts, creeps)  # noqa: E731
     else:
         return None
     return Curve(x, y, _banded(model, own, found, cov, step=family in STEPS))
@@ -288,7 +290,7 @@ def _openings(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[
     return given.commands[:, end].copy(), acted.commands[:, end].copy()
 
 
-def _errors(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[Array, Array]:
+def _errors(model: RigModel, record: Drive, parts: Sequence[Active], over_time: bool) -> tuple[Array, Array]:
     channels = channels_of(parts[0].site)
     true = record.measured.copy()
     for part in reversed(parts):
@@ -299,4 +301,6 @@ def _errors(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[Ar
         hook = model.library[part.effect].outputs
         if hook is not None:
             shown = hook(shown, record.period, channels_of(part.site), part.values, None)[0]
-    return true[:, channels[0]].copy(), (shown - true)[:, channels[0]]
+    time = np.asarray(record.period * np.arange(len(true)), dtype=float)
+    x = time if over_time else true[:, channels[0]].copy()
+    return x, (shown - true)[:, channels[0]]

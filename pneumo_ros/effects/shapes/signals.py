@@ -189,11 +189,11 @@ def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> E
     def outputs(
         given: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
     ) -> tuple[Array, Memory]:
-        begun = 0.0 if memory is None else memory
-        time = begun + period * np.arange(len(given))
+        begun = memory or 0  # rows: a time would add up otherwise in other blocks
+        time = period * np.arange(begun, begun + len(given))
         moved = sum(v * (1.0 - np.exp(-time / tau)) for v, tau in zip(values, CREEPS, strict=True))
         given[:, channels] += np.reshape(moved, (-1, 1))
-        return given, begun + period * len(given)
+        return given, begun + len(given)
 
     atoms = [Atom(f"creep {tau:g} s", unit, typical, signed=True) for tau in CREEPS]
     parameters = tuple(amplitude(atom) for atom in atoms)

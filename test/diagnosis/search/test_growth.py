@@ -13,7 +13,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, refreshed, secant
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.growth import _one_exchanged, grow
 from pneumo_ros.diagnosis.search.screening import compatible
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort
@@ -95,6 +95,51 @@ def test_a_signal_that_resembles_four_effects_makes_room_for_them() -> None:
     values = dict(zip((name for name, _ in chosen.fit.candidate.laws),
                       problem.values(chosen.fit.candidate, chosen.fit.x), strict=True))  # fmt: skip
     assert np.allclose([values[name] for name in TRUE], [1.0, 0.6, 1.2, 0.8], atol=0.01)
+
+
+@dataclass(frozen=True)
+class Sided(Sum):
+    """The same, where one effect acts left, right, or on both sides; a shape of its family does something else."""
+
+    def predict(
+        self, record: Made, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> Array:
+        out = nuisance[0] * SIGNALS["drive"] + initial[0]
+        for one in active:
+            of_sides = {"left": ("c",), "right": ("d",), "both": ("c", "d")}
+            names = of_sides.get(one.site, (one.effect,)) if one.effect != "gauge.shape" else ("b",)
+            out = out + one.values[0] * sum(SIGNALS[name] for name in names)
+        return np.asarray(out[:rows, None])
+
+
+@dataclass(frozen=True)
+class TriedAlone(PlainEffect):
+    """A shape whose one atom is tried alone."""
+
+    screened: tuple[int, ...] = (0,)
+
+
+def test_an_effect_at_the_wrong_site_is_exchanged_for_the_right_one() -> None:
+    effects = {name: one for name, one in _effects().items() if name != "scale"}
+    problem = Problem(Sided(effects=effects), (made({"a": 1.0, "c": 0.8, "d": 0.8}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    wrong = Candidate((("a", ""), ("gauge", "left")))
+    found = fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3)))
+    other = _one_exchanged(search, found)
+    assert other is not None and set(other.candidate.laws) == {("a", ""), ("gauge", "both")}
+    assert score(problem, other).price < score(problem, found).price
+
+
+def test_what_a_law_does_nothing_like_is_tried_by_its_shape_alone() -> None:
+    effects = _effects()
+    effects = {name: effects[name] for name in ("a", "gauge")}
+    shape = TriedAlone("gauge.shape", ("left", "right", "both"), effects["gauge"].parameters)
+    problem = Problem(Sided(effects=effects | {"gauge.shape": shape}), (made({"b": 1.0}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    assert search.singles[0].candidate.laws[0][0] == "gauge" and search.singles[0].candidate.shapes
+    lawless = Problem(Sided(effects=effects), (made({"b": 1.0}),))
+    poor = compete(lawless, Effort(), False, lambda share, what: None)
+    assert score(lawless, poor.singles[0]).level > 100.0 * score(problem, search.singles[0]).level
 
 
 def test_a_secant_reproduces_the_step_and_nothing_else() -> None:
