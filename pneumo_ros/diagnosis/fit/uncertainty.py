@@ -115,24 +115,26 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
     }
 
 
-def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -> float:
-    """How many parameters of its effects, or of some parts, ended at an end of their allowed range.
+def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -> tuple[float, float]:
+    """How many parameters of its effects, or of some parts, ended at an end of their allowed range: of laws and of
+    sizes, and of those that only bend a shape.
 
     A size counts whole: nothing of the kind is so large. What only shapes a law counts half, another law may bend it;
-    and so does a law's size beside its family's shape, which can do the same and may push it anywhere. What bends a
-    shape counts nothing: it stands for laws that nobody knows.
+    and so does a law's size beside its family's shape, which can do the same and may push it anywhere.
     """
-    free, values, found = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x), 0.0
-    first = 0
+    free, values = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x)
+    first, firm, bent = 0, 0.0, 0.0
     for part in fit.candidate.parts:
         own = problem.effect_parameters(Candidate((part,)))
         stuck = [p for k, p in enumerate(own, first) if not free[k] and not _natural(p, values[k])]
-        if parts is None or part in parts:
-            beside = is_law(part[0]) and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-            bent = 0.5 if is_law(part[0]) else 0.0
-            found += sum((0.5 if beside else 1.0) if p.size else bent for p in stuck)
         first += len(own)
-    return found
+        if parts is not None and part not in parts:
+            continue
+        law, sizes = is_law(part[0]), sum(p.size for p in stuck)
+        beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
+        firm += sizes * (0.5 if beside else 1.0) + (0.5 * (len(stuck) - sizes) if law else 0.0)
+        bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
+    return firm, bent
 
 
 def _natural(parameter: EffectParameter, value: float) -> bool:

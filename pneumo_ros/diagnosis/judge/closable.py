@@ -42,7 +42,8 @@ class EffectEvidence:
     share : what it holds of what the refit leaves
     leaves : what the structure leaves over what is left with whatever may act at its places: held-out gaps with nothing
         subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated
-    at_bounds : how many of its parameters stand at a bound that is no natural end of its law
+    at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
+        that bend it
     """
 
     law: Part
@@ -52,6 +53,7 @@ class EffectEvidence:
     ceiling: float
     share: float = 1.0
     at_bounds: float = 0.0
+    bent: float = 0.0
     leaves: float = 1.0
 
     @property
@@ -120,9 +122,10 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         where = problem.model.places(Active(*law, ()))
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         without, ceiling = held_by(problem, bare, holdout).total, added(where)
+        firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         evidence.append(EffectEvidence(
             law, where, _above(without, floor), own, ceiling.gap,
-            at_bounds=at_bounds(problem, best, of_law(best.candidate, law)),
+            at_bounds=firm, bent=bent,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated else 1.0,
         ))  # fmt: skip
     if places:  # together, what is left may need them all; alone, one of them may do

@@ -41,6 +41,8 @@ class Calibration:
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
+    bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
+        count in full: a law that nobody wrote bends it and leaves little, something else leaves more
     traces : what the refit leaves beyond the noise floor, in floors, at which it is as likely the work of traces that
         every rig has, and of a floor that is known to a few per cent
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
@@ -54,6 +56,7 @@ class Calibration:
     steepness: float = 4.0
     real: float = 2.5
     at_bounds: float = 0.9
+    bent: float = 0.25
     least: float = 0.002
     slight: float = 0.12
     traces: float = 0.4
@@ -162,9 +165,14 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     """Probability that an effect of the structure is what acts at its place, 0..1."""
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
+    stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
-               one.at_bounds / c.at_bounds, c.least / max(one.share, 1e-9),
+               stuck / c.at_bounds, c.least / max(one.share, 1e-9),
                c.slight / max(closed, 1e-9), c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
+    if one.places[0].startswith(
+        SENSOR
+    ):  # what moves the rig looks like a sensor's error as well: no less than it is left
+        against.append(one.own / max(one.without - one.own, 1e-12))
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

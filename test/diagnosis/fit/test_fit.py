@@ -205,4 +205,11 @@ def test_natural_ends_of_a_law_are_no_bounds(
 ) -> None:
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(((effect, "front"),))
     x = problem.start(candidate, None, values)
-    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == bounded
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (bounded, 0.0)
+
+
+def test_what_bends_a_shape_is_counted_by_itself_and_a_law_beside_it_half(model: RigModel) -> None:
+    parts = (("bellows_mode", "front"), ("bellows_mode.shape", "front"))
+    problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
+    x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0))
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (0.5, 1.0)
