@@ -112,7 +112,7 @@ def test_a_saved_rig_of_an_fmu_is_a_model_of_it(log: Path, tmp_path: Path) -> No
     task = prepared(fmu, [log])
     saved = save_rig(task.diagnose(Options(pairs=False)), task.model, tmp_path / "saved.yaml")
     again = prepared(fmu, [log], rig=saved)
-    assert {(one.effect.partition(".")[0], one.site) for one in again.model.standing} == {
+    assert {(one.effect.partition(".")[0], one.site) for one in again.model.configured} == {
         ("coulomb_friction", "floor_to_ground")}  # fmt: skip
     assert again.diagnose(Options(pairs=False)).verdict == "none"
 
