@@ -38,6 +38,9 @@ def resolved(function: Function) -> Function:
 
 
 def _spelled(hint: Any) -> Any:
+    within = [kind for kind in get_args(hint) if get_origin(kind) is Annotated] if get_origin(hint) is Union else []
+    if within:  # Python 3.10 puts an Optional around the whole where the default is None
+        return _spelled(within[0])
     if get_origin(hint) is Annotated:
         kind, *notes = get_args(hint)
         return Annotated[(_spelled(kind), *notes)]
