@@ -4,28 +4,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from pneumo_ros.cli.app import App
 from pneumo_ros.cli.diagnose_against import check_against, fitted_half_car
+from pneumo_ros.cli.diagnosis_shown import progress_bar, show
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
-if TYPE_CHECKING:
-    from pneumo_ros.diagnosis.report import Story
-    from pneumo_ros.diagnosis.result import Diagnosis, EditTest
-
 app = App(add_completion=False)
-SHOWN = 5  # rows of the ranking on the terminal; the file has all
 
 
 @app.command()
@@ -164,66 +158,3 @@ def _check_files(
     for key, file in (("--rig", rig), *(("--effect", path) for path in effects or ())):
         if file is not None and not file.is_file():
             raise InputError("no such file", where=file, key=key, remedy="check the name")
-
-
-def show(console: Console, found: Diagnosis, first: Story) -> None:
-    """What the report says first; then the budget, the head of the ranking, the notes, and what to do next."""
-    from pneumo_ros.cli.tables import fact_table
-
-    summary = found.to_json()
-    console.print(f"[bold]{escape(first.headline)}[/bold]", highlight=False)
-    console.print(f"{found.verdict} ({first.confidence})", highlight=False, markup=False)
-    if first.facts:
-        console.print(fact_table(first.facts))
-    if found.verdict != "not_testable":
-        _show_budget(console, summary)
-        _show_ranking(console, summary)
-    if found.edit is not None:
-        _show_edit(console, found.edit)
-    for note in found.notes:
-        console.print(f"note: {note}", highlight=False, markup=False)
-    for step in first.steps:
-        console.print(f"next: {step.text}", highlight=False, markup=False)
-        for line in step.commands:  # whole, so that it can be copied
-            console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
-
-
-def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
-    from pneumo_ros.cli.tables import simple_table
-    from pneumo_ros.diagnosis.report.budget import budget_rows
-
-    rows = []
-    for row in budget_rows(summary):
-        entry = row.get("entry", {})
-        probability = f"{entry['probability']:.2f}" if entry else ""
-        law = {"": "", "differs": "another than the library's"}.get(str(entry.get("law", "")), "the library's")
-        rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
-    console.print(simple_table(("of the gap", "share", "law", "probability"), rows))
-
-
-def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
-    from pneumo_ros.cli.tables import simple_table
-    from pneumo_ros.diagnosis.report.words import structure_words
-
-    rows = []
-    for entry in summary["ranking"][:SHOWN]:
-        lost = entry["gap_after"] is None or entry["shrink"] is None
-        left = ("ran away", "") if lost else (f"{entry['gap_after']:.3g}", f"{100 * entry['shrink']:.1f} %")
-        rows.append((structure_words(entry), f"{entry['probability']:.2f}", *left))
-    console.print(simple_table(("what competed", "probability", "gap left", "closed"), rows))
-
-
-def _show_edit(console: Console, edit: EditTest) -> None:
-    changes = ", ".join(f"{name} {100 * (factor - 1):+.1f} %" for name, factor in edit.changes.items())
-    console.print(
-        f"edit test on {edit.log} ({changes or 'nothing changed'}), nothing refitted: "
-        f"gap nominal {edit.gap_nominal:.3g}, re-estimated {edit.gap_refit:.3g}, best {edit.gap_best:.3g}",
-        highlight=False,
-    )
-
-
-def progress_bar(console: Console) -> Progress:
-    """How far the diagnosis is."""
-    return Progress(
-        TextColumn("{task.description:42.42}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn(), console=console
-    )

@@ -29,7 +29,7 @@ def fitted_half_car(
     console: Console, against: Path, rig: Rig | None, effects: Sequence[Path], pairs: bool
 ) -> Iterator[Rig]:
     """The half car as a log has it: its numbers inside their tolerances, and the effects that it had already."""
-    from pneumo_ros.cli.diagnose import progress_bar
+    from pneumo_ros.cli.diagnosis_shown import progress_bar
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.diagnosis.half_car.from_logs import prepared
     from pneumo_ros.diagnosis.half_car.saved_rig import save_corrected_rig
@@ -49,7 +49,7 @@ def fitted_half_car(
 @contextmanager
 def fitted_own(console: Console, against: Path, model: Path, rig: Path | None, pairs: bool) -> Iterator[Path]:
     """The rig file of one's own rig as a log has it."""
-    from pneumo_ros.cli.diagnose import progress_bar
+    from pneumo_ros.cli.diagnosis_shown import progress_bar
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.own_rig.from_files import prepared
     from pneumo_ros.own_rig.outputs import save_rig

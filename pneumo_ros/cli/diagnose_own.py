@@ -38,7 +38,7 @@ def diagnose_own(
 
     _check_files(fit, holdout, model, rig_file_of(model, rig))
     refuse_old_diagnosis(output, save_rig, overwrite, [rig_file_of(model, rig)])
-    from pneumo_ros.cli.diagnose import progress_bar, show
+    from pneumo_ros.cli.diagnosis_shown import progress_bar, show
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.diagnosis.report import Asked, claim_folder
     from pneumo_ros.own_rig import outputs

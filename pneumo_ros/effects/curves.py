@@ -8,26 +8,55 @@ bin holds is the mean law there and how much of the run stood in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.composition import PlantTerm
-from pneumo_ros.effects.contract import Effect, Inputs, channels_of, ends_of
+from pneumo_ros.effects.composition import PlantTerm, Slot
+from pneumo_ros.effects.contract import Effect, Inputs, Memory, Plant, channels_of, ends_of
 from pneumo_ros.effects.drive import Drive
 from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of, tyre_of
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
-from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.units import GAS_CONSTANT
 
 THINNED = 8e-3  # s between rows that are evaluated
 BINS = 25
 STEP_TIME, STEP_ROWS = 0.3, 60  # s of a step response, and its points
 DIFFERENCE = 1e-3  # of a typical value, for the band
+
+
+class Running(Protocol):
+    """What is needed of a rig's model: its effects, and a run along which they are seen."""
+
+    @property
+    def library(self) -> Mapping[str, Effect]: ...
+
+    @property
+    def surface(self) -> AreaSurface: ...
+
+    @property
+    def slots(self) -> Sequence[Slot]: ...
+
+    def states(
+        self,
+        record: Drive,
+        nuisance: Array | None = None,
+        initial: Array | None = None,
+        active: Sequence[Active] = (),
+        correction: Array | None = None,
+        rows: int | None = None,
+    ) -> Array: ...
+
+    def driven(
+        self, inputs: Inputs, period: float, active: Sequence[Active] = (), memory: tuple[Memory, ...] = ()
+    ) -> tuple[Inputs, tuple[Memory, ...]]: ...
+
+    def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant: ...
 
 
 class _Row(NamedTuple):
@@ -93,7 +122,7 @@ OPENINGS = ("valve_deadband", "anything.valve")
 
 
 def curve_of(
-    model: RigModel, record: Drive, nuisance: Array, active: Sequence[Active], own: Sequence[Active], cov: Array
+    model: Running, record: Drive, nuisance: Array, active: Sequence[Active], own: Sequence[Active], cov: Array
 ) -> Curve | None:
     """The curve of one effect (law and shape at one site) of a fitted structure; None where it has none.
 
@@ -130,7 +159,7 @@ def curve_of(
 
 
 def _banded(
-    model: RigModel, own: Sequence[Active], found: Callable[[Sequence[Active]], tuple[Array, Array]], cov: Array,
+    model: Running, own: Sequence[Active], found: Callable[[Sequence[Active]], tuple[Array, Array]], cov: Array,
     step: bool,
 ) -> Array:  # fmt: skip
     """(B, 5) binned curve with its 90 % band by linear propagation of the parameters' covariance."""
@@ -149,7 +178,7 @@ def _banded(
     return np.column_stack([centres, mean, mean - band, mean + band, weight])
 
 
-def _moves(model: RigModel, own: Sequence[Active]) -> Iterator[tuple[int, int, float]]:
+def _moves(model: Running, own: Sequence[Active]) -> Iterator[tuple[int, int, float]]:
     for part, active in enumerate(own):
         for k, p in enumerate(model.library[active.effect].parameters):
             size = DIFFERENCE * p.typical
@@ -183,7 +212,7 @@ class _Run:
     period: float
 
 
-def _rows(model: RigModel, record: Drive, nuisance: Array, active: Sequence[Active], site: str, total: bool) -> _Run:
+def _rows(model: Running, record: Drive, nuisance: Array, active: Sequence[Active], site: str, total: bool) -> _Run:
     states = model.states(record, nuisance, None, active)
     inputs = model.driven(Inputs(record.commands, record.road), record.period, active)[0]
     every = max(1, round(THINNED / record.period))
@@ -202,7 +231,7 @@ def _rows(model: RigModel, record: Drive, nuisance: Array, active: Sequence[Acti
 
 
 def _row(
-    model: RigModel, nuisance: Array, active: Sequence[Active], state: Array, inputs: Inputs, i: int, end: int,
+    model: Running, nuisance: Array, active: Sequence[Active], state: Array, inputs: Inputs, i: int, end: int,
     period: float,
 ) -> _Row:  # fmt: skip
     plant = model.plant(nuisance, active)
@@ -221,12 +250,12 @@ def _row(
     return _Row(strut, air, tyre_of(top, axle, top_rate, axle_rate, inputs.road[i, end], slope, stiffness))
 
 
-def _along(model: RigModel, parts: Sequence[Active], run: _Run, shared: bool) -> Array:
+def _along(model: Running, parts: Sequence[Active], run: _Run, shared: bool) -> Array:
     """Output of the parts' terms along the run, summed."""
     return np.sum([_term_along(model, part, run, shared) for part in parts], axis=0)
 
 
-def _term_along(model: RigModel, part: Active, run: _Run, shared: bool) -> Array:
+def _term_along(model: Running, part: Active, run: _Run, shared: bool) -> Array:
     term = model.library[part.effect].term
     values = _values(model, part)
     if term is None or not any(part.values):
@@ -253,7 +282,7 @@ def _output(term: PlantTerm, row: _Row, z: Any, values: tuple[float, ...]) -> fl
     return float(term.air(row.air, z, values)) if term.air is not None else 0.0
 
 
-def _values(model: RigModel, part: Active) -> tuple[float, ...]:
+def _values(model: Running, part: Active) -> tuple[float, ...]:
     effect = model.library[part.effect]
     if not effect.columns:
         return tuple(float(v) for v in part.values)
@@ -263,7 +292,7 @@ def _values(model: RigModel, part: Active) -> tuple[float, ...]:
     return tuple(whole)
 
 
-def _step_response(model: RigModel, parts: Sequence[Active]) -> tuple[Array, Array]:
+def _step_response(model: Running, parts: Sequence[Active]) -> tuple[Array, Array]:
     period = STEP_TIME / STEP_ROWS
     u = np.ones((STEP_ROWS + 4, 6))
     u[:4] = 0.0
@@ -279,7 +308,7 @@ def _step_response(model: RigModel, parts: Sequence[Active]) -> tuple[Array, Arr
     return np.asarray(np.arange(STEP_ROWS) * period), u[4:, column]
 
 
-def _openings(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[Array, Array]:
+def _openings(model: Running, record: Drive, parts: Sequence[Active]) -> tuple[Array, Array]:
     end = ends_of(parts[0].site).columns[0]
     given = Inputs(record.commands, record.road)
     acted = given
@@ -290,7 +319,7 @@ def _openings(model: RigModel, record: Drive, parts: Sequence[Active]) -> tuple[
     return given.commands[:, end].copy(), acted.commands[:, end].copy()
 
 
-def _errors(model: RigModel, record: Drive, parts: Sequence[Active], over_time: bool) -> tuple[Array, Array]:
+def _errors(model: Running, record: Drive, parts: Sequence[Active], over_time: bool) -> tuple[Array, Array]:
     channels = channels_of(parts[0].site)
     true = record.measured.copy()
     for part in reversed(parts):

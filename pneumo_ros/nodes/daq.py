@@ -29,7 +29,7 @@ from pneumo_ros.log.cdr import JointDecoder
 from pneumo_ros.nodes.base import ERROR, OK, WARN, RigNode
 from pneumo_ros.nodes.daq_output import MeasurementOutput, WallClock
 from pneumo_ros.nodes.daq_services import RigServices
-from pneumo_ros.nodes.daq_session import HardwareSession
+from pneumo_ros.nodes.daq_session import HardwareNode, HardwareSession
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE
 from pneumo_ros.nodes.sources import SoleSource
 from pneumo_ros.nodes.spin import node_main
@@ -58,14 +58,8 @@ LEVELS = {Level.OK: OK, Level.WARN: WARN, Level.ERROR: ERROR}
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
-class DaqNode(LifecycleNodeMixin, RigNode):
-    """Thin shell over :class:`pneumo_ros.daq.driver.SerialDriver`.
-
-    Attributes
-    ----------
-    driver : None while unconfigured
-    reason : why the last transition was refused
-    """
+class DaqNode(HardwareNode):
+    """Thin shell over :class:`pneumo_ros.daq.driver.SerialDriver`."""
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
         RigNode.__init__(self, "daq", PARAMETERS, context=context, overrides=overrides, owns_time=True)
@@ -74,7 +68,7 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         self.rig = load_rig(self.values["rig"] or None)
         self.safety = load_safety(self.values["safety"] or None)
         self.calibration = load_calibration(self.values["calibration"])
-        self.driver: SerialDriver | None = None
+        self.driver = None
         self.report: LinkReport | None = None
         self.wall = WallClock()
         self.output = MeasurementOutput(self, self.rig, self.wall)
@@ -93,11 +87,6 @@ class DaqNode(LifecycleNodeMixin, RigNode):
         driver = getattr(self, "driver", None)
         intake = driver.core.intake if driver is not None else None
         return intake.hello.serial_number if intake is not None else super().hardware_id
-
-    @property
-    def state_label(self) -> str:
-        """Life cycle state: unconfigured, inactive, active or finalized."""
-        return str(self._state_machine.current_state[1])
 
     # -- life cycle ------------------------------------------------------------------------------------------------
 

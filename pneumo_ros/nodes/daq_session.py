@@ -5,20 +5,42 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING
 
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleNodeMixin, TransitionCallbackReturn
 
 from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.daq.driver import SerialDriver
 from pneumo_ros.daq.reasons import Event
-from pneumo_ros.nodes.base import ERROR, OK, say, tell_end
-
-if TYPE_CHECKING:
-    from pneumo_ros.nodes.daq import DaqNode
+from pneumo_ros.nodes.base import ERROR, OK, RigNode, say, tell_end
+from pneumo_ros.nodes.daq_output import WallClock
 
 LOOK_PERIOD = 0.01  # s between looks at the driver's mode
 PROGRESS_PERIOD = 0.2  # s between progress lines
 TRIPPED, NOT_STARTED = 1, 2  # exit codes
+
+
+class HardwareNode(LifecycleNodeMixin, RigNode):
+    """A node with a life cycle that drives hardware, as far as a session needs to know it.
+
+    Attributes
+    ----------
+    driver : None while unconfigured
+    reason : why the last transition was refused
+    wall : monotonic time to ROS time
+    """
+
+    driver: SerialDriver | None
+    reason: str
+    wall: WallClock
+
+    @property
+    def state_label(self) -> str:
+        """Life cycle state: unconfigured, inactive, active or finalized."""
+        return str(self._state_machine.current_state[1])
+
+    def blockers(self) -> list[str]:
+        """Why the valves cannot be armed; empty if they can."""
+        raise NotImplementedError
 
 
 class HardwareSession:
@@ -29,7 +51,7 @@ class HardwareSession:
     node : its parameters autostart, arm_patience, duration and report_progress are obeyed
     """
 
-    def __init__(self, node: DaqNode) -> None:
+    def __init__(self, node: HardwareNode) -> None:
         self._node = node
         self._asked = self._next_progress = 0.0
         self._first_ns = 0

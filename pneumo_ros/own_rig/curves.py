@@ -6,19 +6,22 @@ Force over rate or travel, flow over pressure, a signal over what it was told, t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.arrays import Array
+from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
-from pneumo_ros.own_rig.model import OwnRig, slot_of
+from pneumo_ros.own_rig.measures import Scaling
+from pneumo_ros.own_rig.physics import Physics
 from pneumo_ros.own_rig.records import OwnRecord
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
 from pneumo_ros.slots.kinds import Flow, Force
+from pneumo_ros.slots.library import SlotEffect
 
 BINS = 25
 STEP_ROWS = 60
@@ -29,8 +32,34 @@ STEPS = ("lag", "delay")
 Found = Callable[[Sequence[Active]], tuple[Array, Array]]
 
 
+class Running(Protocol):
+    """What is needed of a rig: its slots, their effects, and a run along which they are seen."""
+
+    @property
+    def physics(self) -> Physics: ...
+
+    @property
+    def scaling(self) -> Scaling: ...
+
+    @property
+    def library(self) -> Mapping[str, SlotEffect]: ...
+
+    def initial(self, record: OwnRecord, active: Sequence[Active] = ()) -> tuple[Array, Array]: ...
+
+    def run(
+        self, record: OwnRecord, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> tuple[Array, Array, Array]:
+        """Channels (N, C), coordinates of the slots in the equations (N, K, 3) and what acts there (N, K)."""
+
+    def values(self, active: Sequence[Active]) -> tuple[Array, Mask]:
+        """Values of the slots in the equations (K, V), and which are at work."""
+
+    def signal_values(self, place: str, active: Sequence[Active]) -> Array | None:
+        """Values of a signal's slot (V,); None where nothing is at work."""
+
+
 def curve_of(
-    model: OwnRig, record: OwnRecord, nuisance: Array, active: Sequence[Active], own: Sequence[Active], cov: Array
+    model: Running, record: OwnRecord, nuisance: Array, active: Sequence[Active], own: Sequence[Active], cov: Array
 ) -> Curve:
     """The curve of one effect's parts.
 
@@ -40,7 +69,8 @@ def curve_of(
     own : its parts, at one site
     cov : (P, P) covariance of their values, in order
     """
-    slot, family = slot_of(model, own[0].site), family_of(own[0].effect)
+    slot = next(slot for slot in model.physics.slots if slot.place == own[0].site)
+    family = family_of(own[0].effect)
     if isinstance(slot, (Force, Flow)):
         where = model.run(record, nuisance, model.initial(record, active)[0], active)[1]
         seen = where[:, model.physics.inside.index(slot)]
@@ -69,7 +99,7 @@ def curve_of(
 _OVER_TRAVEL = ("stop", "spring_error", "backlash", "relaxation", "resonance", "lift_off")
 
 
-def _along(model: OwnRig, parts: Sequence[Active], seen: Array, record: OwnRecord) -> Array:
+def _along(model: Running, parts: Sequence[Active], seen: Array, record: OwnRecord) -> Array:
     """What the parts do along coordinates (M, 3)."""
     P, _ = model.values(parts)
     k = [slot.place for slot in model.physics.inside].index(parts[0].site)
@@ -89,7 +119,7 @@ def _along(model: OwnRig, parts: Sequence[Active], seen: Array, record: OwnRecor
     return out
 
 
-def _signal(model: OwnRig, parts: Sequence[Active], record: OwnRecord, step: bool) -> tuple[Array, Array]:
+def _signal(model: Running, parts: Sequence[Active], record: OwnRecord, step: bool) -> tuple[Array, Array]:
     place = parts[0].site
     S = model.scaling.signals[place]
     P = model.signal_values(place, parts)
@@ -109,7 +139,7 @@ def _signal(model: OwnRig, parts: Sequence[Active], record: OwnRecord, step: boo
     return u.copy(), u if P is None else si.passed(u, record.period, P, S)
 
 
-def _points(model: OwnRig, own: Sequence[Active], found: Found, cov: Array, binned: bool) -> Array:
+def _points(model: Running, own: Sequence[Active], found: Found, cov: Array, binned: bool) -> Array:
     """(B, 5) curve with its 90 % band by linear propagation of the values' covariance."""
     x, y = found(own)
     bins, centres, weight = _bins(x) if binned else (np.arange(len(x), dtype=np.intp), x, np.full(len(x), 1.0 / len(x)))

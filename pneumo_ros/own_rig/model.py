@@ -19,7 +19,7 @@ from pneumo_ros.own_rig.physics import Physics
 from pneumo_ros.own_rig.records import OwnRecord, first_values
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
-from pneumo_ros.slots.kinds import Flow, Force, Slot
+from pneumo_ros.slots.kinds import Flow, Force
 from pneumo_ros.slots.library import SlotEffect, effects_of
 
 
@@ -261,8 +261,3 @@ def _check_configured(rig: Description, model: OwnRig) -> None:
             told = f"{one.effect} at {one.site}"
             raise InputError("no such effect at this slot", where=rig.path, key="effects", value=told,
                              remedy="give the rig.py that it was saved with")  # fmt: skip
-
-
-def slot_of(model: OwnRig, place: str) -> Slot:
-    """The slot of a place."""
-    return next(slot for slot in model.physics.slots if slot.place == place)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from pneumo_ros.diagnosis.diagnose import diagnose
-from pneumo_ros.diagnosis.fit.pace import HALF_CAR, pace_of, pace_of_signals
+from pneumo_ros.diagnosis.fit.pace import HALF_CAR, pace_of_signals
+from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.errors import InputError
 
 GOOD = np.random.default_rng(1).normal(size=(100, 1))

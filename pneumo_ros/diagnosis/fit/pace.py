@@ -2,21 +2,17 @@
 """The lengths that a diagnosis measures time by: blocks, averages, settling, correlation.
 
 A half car's log at 500 Hz, a tank sampled every 4 s and a circuit at 610 Hz have nothing in common but that each has a
-slowest and a fastest motion. A record may state its own pace (:func:`pace_of_signals` reads it off the data); without
-one the half car's stands.
+slowest and a fastest motion: :func:`pace_of_signals` reads it off the data.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.model import Record
-from pneumo_ros.diagnosis.traits import HasPace
 
 FEWEST_BLOCKS: Final = 9  # blocks of a whole record at least: three folds of three [numerics]
 MOST_BLOCKS: Final = 48  # blocks of a whole record at most: shorter ones tell no more [taste]
@@ -53,11 +49,6 @@ class Pace:
 
 
 HALF_CAR: Final = Pace()  # lengths of the half car: body at about 2 Hz, wheel hop at 9 Hz, logs at 500 Hz [physics]
-
-
-def pace_of(record: Record) -> Pace:
-    """A record's own pace, or the half car's."""
-    return record.pace if isinstance(record, HasPace) else HALF_CAR
 
 
 def pace_of_signals(measured: Array, period: float, noise: Array | None = None) -> Pace:
@@ -98,8 +89,3 @@ def _band(column: Array, period: float, sigma: float) -> tuple[float, float]:
     share = np.cumsum(power) / power.sum()
     slow = frequency[int(np.searchsorted(share, 0.5))]
     return float(slow), float(frequency[min(int(np.searchsorted(share, FASTEST)), len(frequency) - 1)])
-
-
-def shared_pace(records: Sequence[Record]) -> Pace:
-    """The pace that logs are fitted at: that of the longest."""
-    return pace_of(max(records, key=lambda r: len(r.measured) * r.period))

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
-from pneumo_ros.diagnosis.fit.pace import Pace, shared_pace
+from pneumo_ros.diagnosis.fit.pace import Pace
+from pneumo_ros.diagnosis.fit.record_pace import shared_pace
 from pneumo_ros.diagnosis.model import Model, Record, parameters_at
 from pneumo_ros.diagnosis.traits import HasCoarse, HasModelForm, HasScale, HasSlowNoise
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law

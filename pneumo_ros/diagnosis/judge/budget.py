@@ -19,8 +19,8 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.box import bounded_newton
-from pneumo_ros.diagnosis.fit.pace import pace_of
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
+from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit
 from pneumo_ros.diagnosis.judge.held_out import free_run
 from pneumo_ros.diagnosis.search.fitting import restricted

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.pace import pace_of
+from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
 from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
