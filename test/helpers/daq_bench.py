@@ -28,6 +28,7 @@ from pneumo_ros.nodes.emergency_stop import RESET_SERVICE
 
 SUCCESS = TransitionCallbackReturn.SUCCESS
 PATIENCE = 40.0  # s; a loaded computer is slow, not wrong
+ASK_AGAIN = 5.0  # s without an answer from a service
 DAQ = {"mode": "realtime", "autostart": False, "calibration": CALIBRATION, "session_nodes": "daq"}
 ORDINARY = QoSProfile(depth=10)
 
@@ -94,17 +95,21 @@ class Bench:
         self.until(lambda: time.monotonic() > end, "the message")
 
     def call(self, name: str) -> tuple[bool, str]:
-        client = self.other().create_client(Trigger, name)
-        self.until(client.service_is_ready, name)
-        future = client.call_async(Trigger.Request())
-        self.until(future.done, "an answer")
-        answer: Any = future.result()
-        return answer.success, answer.message
+        end = time.monotonic() + PATIENCE
+        while True:  # DDS matches the two directions of a service one by one: a first answer may find nobody yet
+            client = self.other().create_client(Trigger, name)
+            self.until(client.service_is_ready, name)
+            future, again = client.call_async(Trigger.Request()), time.monotonic() + ASK_AGAIN
+            self.until(lambda: future.done() or time.monotonic() > again, "an answer")  # noqa: B023
+            if future.done():
+                answer: Any = future.result()
+                return answer.success, answer.message
+            assert time.monotonic() < end, f"no answer from {name}"
 
     def reset(self) -> None:
         """As a person does it: until the rig is healthy."""
         end = time.monotonic() + PATIENCE
-        while not self.call(RESET_SERVICE)[0]:
+        while not self.call(RESET_SERVICE)[0] and self.node.driver.core.mode is Mode.ESTOP:
             assert time.monotonic() < end, "never healthy enough to reset"
 
     # -- states ----------------------------------------------------------------------------------------------------
