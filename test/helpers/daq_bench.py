@@ -17,7 +17,7 @@ from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
@@ -90,7 +90,11 @@ class Bench:
         """A panel that publishes once, as soon as somebody listens, and goes on existing."""
         panel = self.other().create_publisher(Bool, "/rig/estop", qos)
         self.until(lambda: panel.get_subscription_count() > 0, "a subscription that matches")
-        panel.publish(Bool(data=value))
+        # Best effort is what it says: once may be lost while the other side has not yet found the panel.
+        for _ in range(1 if qos.reliability == ReliabilityPolicy.RELIABLE else 6):
+            panel.publish(Bool(data=value))
+            end = time.monotonic() + 0.1
+            self.until(lambda: time.monotonic() > end, "the message")  # noqa: B023
         end = time.monotonic() + 0.3
         self.until(lambda: time.monotonic() > end, "the message")
 
