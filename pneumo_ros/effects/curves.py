@@ -42,21 +42,11 @@ class Running(Protocol):
     @property
     def slots(self) -> Sequence[Slot]: ...
 
-    def states(
-        self,
-        record: Drive,
-        nuisance: Array | None = None,
-        initial: Array | None = None,
-        active: Sequence[Active] = (),
-        correction: Array | None = None,
-        rows: int | None = None,
-    ) -> Array: ...
+    def states(self, record: Drive, nuisance: Array, initial: None, active: Sequence[Active]) -> Array: ...
 
-    def driven(
-        self, inputs: Inputs, period: float, active: Sequence[Active] = (), memory: tuple[Memory, ...] = ()
-    ) -> tuple[Inputs, tuple[Memory, ...]]: ...
+    def driven(self, inputs: Inputs, period: float, active: Sequence[Active]) -> tuple[Inputs, tuple[Memory, ...]]: ...
 
-    def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant: ...
+    def plant(self, nuisance: Array, active: Sequence[Active]) -> Plant: ...
 
 
 class _Row(NamedTuple):

@@ -14,15 +14,17 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.own_rig.bridge import CHANNELS, compiled, coordinates, derivative, reading, settle
+from pneumo_ros.slots.flow import MEMORIES as FLOW_MEMORIES
 from pneumo_ros.slots.flow import advance as advance_flow
 from pneumo_ros.slots.flow import flow
 from pneumo_ros.slots.flow import start as start_flow
+from pneumo_ros.slots.force import MEMORIES as FORCE_MEMORIES
 from pneumo_ros.slots.force import advance as advance_force
 from pneumo_ros.slots.force import force
 from pneumo_ros.slots.force import start as start_force
 
 LARGEST = 1e100  # of a state: beyond it a run has diverged
-MEMORIES = 17  # of a slot of any kind
+MEMORIES = max(FORCE_MEMORIES, FLOW_MEMORIES)
 
 
 @compiled

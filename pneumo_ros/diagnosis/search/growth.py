@@ -30,7 +30,7 @@ SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [n
 COUNTS: Final = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
 EXCHANGED: Final = (6, 3)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
-MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which a structure is wrong [taste]
+MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which exchanges are tried [taste]
 MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 # Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
 STEP: Final = 0.3
@@ -101,10 +101,10 @@ def _one_less(problem: Problem, found: Fit) -> Fit | None:
 
 
 def _one_exchanged(search: Search, found: Fit) -> Fit | None:
-    """The structure with the one of its effects exchanged, for another or for another site, that promises most.
+    """The structure with one of its effects exchanged for another, or for another site: the best of those fitted.
 
-    What is left without each effect is screened for what may take its place, and the likeliest of all these together
-    are probed: the effect that a structure misses least need not be the wrong one.
+    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
+    of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
     """
     problem = search.problem
     chosen: list[tuple[float, CandidateScore, Fit]] = []

@@ -15,14 +15,16 @@ from pneumo_ros.own_rig.bridge import CHANNELS, compiled
 from pneumo_ros.own_rig.fmu.calls import get2 as get_values
 from pneumo_ros.own_rig.fmu.calls import set2 as set_values
 from pneumo_ros.own_rig.fmu.calls import step2 as step
+from pneumo_ros.slots.flow import MEMORIES as FLOW_MEMORIES
 from pneumo_ros.slots.flow import advance as advance_flow
 from pneumo_ros.slots.flow import flow
 from pneumo_ros.slots.flow import start as start_flow
+from pneumo_ros.slots.force import MEMORIES as FORCE_MEMORIES
 from pneumo_ros.slots.force import advance as advance_force
 from pneumo_ros.slots.force import force
 from pneumo_ros.slots.force import start as start_force
 
-MEMORIES = 17  # of a slot of any kind
+MEMORIES = max(FORCE_MEMORIES, FLOW_MEMORIES)
 
 
 @compiled

@@ -134,6 +134,26 @@ def test_no_small_name_stands_beside_something_larger_without_one() -> None:
     assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), [sensor, elsewhere]).verdict == "unknown"
 
 
+@pytest.mark.parametrize(("left", "named"), [(1.5, True), (9.0, False)])
+def test_what_bends_a_shape_counts_the_more_the_more_is_left(left: float, named: bool) -> None:
+    refit, chosen = scored(400.0, 3000.0), scored(0.6, -500.0, "bellows_mode", unknowns=36)
+    bent = [replace(one, at_bounds=0.5, bent=1.0) for one in evidence(chosen, 1.0, 0.1, 0.1)]
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, left), bent)
+    assert told.verdict == ("bellows_mode" if named else "unknown")
+
+
+@pytest.mark.parametrize(
+    ("place", "own", "named"),
+    [("sensor:sprung_front", 0.3, True), ("sensor:sprung_front", 0.8, False), ("front_force", 0.8, True)],
+)
+def test_a_sensor_error_must_hold_more_than_is_left(place: str, own: float, named: bool) -> None:
+    """What moves the rig looks like an error of a sensor as well."""
+    refit, chosen = scored(400.0, 3000.0), scored(60.0, 1000.0, "lvdt_offset", unknowns=36)
+    found = [replace(one, places=(place,)) for one in evidence(chosen, 1.0, own, own)]
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 20.0 * own), found)
+    assert told.verdict == ("lvdt_offset" if named else "unknown")
+
+
 def test_a_refit_that_fails_on_the_held_out_log_is_not_none() -> None:
     assert opinion(scored(0.2, -900.0), held=HeldOutGaps(15.0, 15.0)).verdict == "unknown"
 
