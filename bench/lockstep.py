@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much faster than real time a lockstep session runs, as five processes and in one, one run, medians."""
+"""How much faster than real time a lockstep session runs, as five processes and in one, one run, medians.
+
+Beside each session the same messages between nodes that compute nothing (bare_ring.py): what bare rclpy leaves.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,18 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bare_ring import HOPS, ring
+
+from pneumo_ros.nodes.neighbours import claim_place
 from pneumo_ros.session.summary import load_session, wall_time
 
 LIMITS = {"five processes": 4.0, "one process": 15.0}
+RATE = 500.0  # Hz
+SECONDS = 5.0  # of the bare ring
 
 
 def speed(folder: Path, duration: float, single: bool) -> float:
-    """Session time over wall time of one 500 Hz session."""
+    """Session time over wall time of one session."""
     log = folder / f"session-{len(list(folder.iterdir()))}.mcap"
     options = ["--single-process"] if single else []
     subprocess.run(
@@ -27,20 +35,35 @@ def speed(folder: Path, duration: float, single: bool) -> float:
     return float(load_session(log).time[-1]) / wall_time(log)
 
 
+def bare(single: bool) -> float:
+    """The same factor of the ring."""
+    claim = claim_place(None, "", isolate=True, what="a bare ring of messages")
+    try:
+        return ring(claim.domain, SECONDS, single) / RATE
+    finally:
+        claim.release()
+
+
 def main() -> None:
-    """Print both factors and their limits."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Print both factors, their limits, and what bare rclpy reaches."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--duration", type=float, default=20.0, help="s of session")
     arguments = parser.parse_args()
-    factors: dict[str, list[float]] = {name: [] for name in LIMITS}
+    factors: dict[str, list[tuple[float, float]]] = {name: [] for name in LIMITS}
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(arguments.rounds):
             for name, values in factors.items():
-                values.append(speed(Path(folder), arguments.duration, name == "one process"))
+                single = name == "one process"
+                values.append((bare(single), speed(Path(folder), arguments.duration, single)))
+    print(f"{HOPS:.1f} messages a period reach a subscriber")
     for name, values in factors.items():
-        spread = f"{min(values):.1f} to {max(values):.1f}"
-        print(f"{name:15s} {statistics.median(values):5.1f} x real time ({spread}; limit {LIMITS[name]:.0f})")
+        bares, sessions = zip(*values, strict=True)
+        ratio = statistics.median(b / s for b, s in values)
+        hop = 1e6 / (RATE * statistics.median(bares) * HOPS)
+        print(f"{name:15s} {statistics.median(sessions):5.1f} x real time ({min(sessions):.1f} to {max(sessions):.1f}; "
+              f"limit {LIMITS[name]:.0f}); bare {statistics.median(bares):.1f} x ({hop:.1f} us a hop), "
+              f"{ratio:.2f} times as fast as the session")  # fmt: skip
 
 
 if __name__ == "__main__":
