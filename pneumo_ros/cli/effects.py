@@ -33,19 +33,25 @@ def effects(
     from pneumo_ros.errors import not_one_of
 
     library, console = laws_of(load_library(file or ())), Console(highlight=False)
+    from pneumo_ros.slots.guides import GUIDES
+
     if effect is None:
         _list(console, library)
-        return
-    if effect not in library:
-        raise not_one_of("no such effect", effect, library, where="pneumo effects")
-    _show(console, library[effect])
+    elif effect in library:
+        _show(console, library[effect])
+    elif effect in GUIDES:
+        _show_family(console, effect)
+    else:
+        raise not_one_of("no such effect", effect, [*library, *GUIDES], where="pneumo effects")
 
 
 def _list(console: Console, library: Mapping[str, Effect]) -> None:
     from pneumo_ros.cli.tables import plain_table
+    from pneumo_ros.slots.guides import GUIDES
 
     console.print(plain_table(("effect", "meaning"), [(name, one.summary) for name, one in sorted(library.items())]))
     console.print("pneumo effects ID says more: parameters, what looks like it, how to check it by hand")
+    console.print(f"at the slots of a rig of your own (--rig-model): {', '.join(sorted(GUIDES))}")
 
 
 def _show(console: Console, effect: Effect) -> None:
@@ -67,6 +73,22 @@ def _show(console: Console, effect: Effect) -> None:
         console.print(f"[bold]not {other}[/]: {escape(difference)}")
     size = effect.parameters[0]
     console.print(f"a first guess is {displayed(size.typical, size.unit)}")
+
+
+def _show_family(console: Console, family: str) -> None:
+    """A family of a rig of one's own: its laws at each kind of slot, and its guide."""
+    from rich.markup import escape
+
+    from pneumo_ros.cli.tables import plain_table
+    from pneumo_ros.slots.guides import GUIDES, plain_check
+    from pneumo_ros.slots.sheet import laws_of_family
+
+    guide = GUIDES[family]
+    console.print(f"[bold]{family}[/], at slots of a rig of your own: {escape(guide.meaning)}\n")
+    console.print(plain_table(("law", "at", "what it is"), laws_of_family(family)))
+    console.print(f"[bold]by hand[/]: {escape(plain_check(guide))}")
+    for other, difference in guide.mistaken_for.items():
+        console.print(f"[bold]not {other}[/]: {escape(difference)}")
 
 
 if __name__ == "__main__":

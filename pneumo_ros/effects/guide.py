@@ -18,6 +18,7 @@ _DISPLAYED = {  # SI unit -> factor and unit that people read
     "1/m": (1.0, "/m"),
     "s/m": (1.0, "s/m"),
 }
+_AS_MEASURED = "what the report's measured curve shows"
 _NAME = re.compile(r"\{(\w+)\}")
 
 
@@ -41,8 +42,8 @@ class Guide:
         return set(_NAME.findall(self.check))
 
     def check_with(self, values: Mapping[str, tuple[float, str]]) -> str:
-        """The check with ``values`` (parameter -> value in SI, and its unit) in place."""
-        return _NAME.sub(lambda found: displayed(*values[found[1]]), self.check)
+        """The check with ``values`` (parameter -> value in SI, and its unit) in place, elsewhere where to look."""
+        return _NAME.sub(lambda found: displayed(*values[found[1]]) if found[1] in values else _AS_MEASURED, self.check)
 
 
 def displayed(value: float, unit: str) -> str:

@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import ANYTHING, SHAPE, Derived, EffectParameter, family_of
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
+from pneumo_ros.slots.guides import GUIDES
 from pneumo_ros.slots.kinds import Slot
 from pneumo_ros.slots.laws import LAWS, Knob, Law, Measures
 from pneumo_ros.slots.shapes import CONES, ROWS, Row
@@ -69,8 +70,8 @@ def families_of(kind: str) -> tuple[str, ...]:
 def _joined(known: SlotEffect | None, one: SlotEffect) -> SlotEffect:
     if known is None:
         return one
-    return SlotEffect(known.id, known.summary, (*known.sites, *one.sites), {**known.by_site, **one.by_site},
-                      {**known.columns, **one.columns})  # fmt: skip
+    return replace(known, sites=(*known.sites, *one.sites), by_site={**known.by_site, **one.by_site},
+                   columns={**known.columns, **one.columns})  # fmt: skip
 
 
 def _at(slot: Slot, m: Measures) -> Iterator[SlotEffect]:
@@ -87,7 +88,14 @@ def _at(slot: Slot, m: Measures) -> Iterator[SlotEffect]:
 def _law(law: Law, slot: Slot, m: Measures) -> SlotEffect:
     parameters = tuple(_parameter(knob, m) for knob in law.knobs)
     columns = tuple(knob.column for knob in law.knobs)
-    return SlotEffect(law.id, law.summary, (slot.place,), {slot.place: parameters}, {slot.place: columns})
+    return SlotEffect(
+        law.id, law.summary, (slot.place,), {slot.place: parameters}, {slot.place: columns}, guide=_guide(law)
+    )
+
+
+def _guide(law: Law) -> Guide:
+    guide = GUIDES[family_of(law.id)]
+    return replace(guide, check=guide.check.replace("{size}", f"{{{law.knobs[0].name}}}"))
 
 
 def _parameter(knob: Knob, m: Measures) -> EffectParameter:

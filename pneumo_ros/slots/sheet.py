@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.parameters import family_of
+from pneumo_ros.slots.guides import GUIDES, plain_check
 from pneumo_ros.slots.kinds import Contact, Flow, Force, Input, Sensor, Slot
 from pneumo_ros.slots.laws import LAWS, Law
 from pneumo_ros.slots.library import families_of
@@ -14,7 +15,22 @@ KINDS: tuple[type[Slot], ...] = (Force, Contact, Flow, Input, Sensor)
 
 def families_page() -> str:
     """The page's body, Markdown."""
-    return "\n".join(_kind(kind) for kind in KINDS)
+    return "\n".join([*(_kind(kind) for kind in KINDS), _by_hand()])
+
+
+def laws_of_family(family: str) -> list[tuple[str, str, str]]:
+    """(law, kinds of slot, what it is) of each law of a family."""
+    laws = [law for law in LAWS if family_of(law.id) == family]
+    return [(law.id.partition(".")[2] or "-", ", ".join(law.kinds), law.summary) for law in laws]
+
+
+def _by_hand() -> str:
+    """What each family is, how to check it, and what tells its look-alikes apart."""
+    rows = ["## By hand", "", "| family | what happens | check | what looks like it |", "|---|---|---|---|"]
+    for family, guide in GUIDES.items():
+        others = "; ".join(f"`{other}` {words}" for other, words in guide.mistaken_for.items())
+        rows.append(f"| `{family}` | {guide.meaning} | {plain_check(guide)} | {others} |")
+    return "\n".join(rows) + "\n"
 
 
 def _kind(kind: type[Slot]) -> str:

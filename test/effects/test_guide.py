@@ -49,6 +49,15 @@ def test_an_effect_is_read_on_the_terminal(width: str) -> None:
     assert all(name in listed.output for name in LIBRARY) and "…" not in listed.output
 
 
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_a_family_of_a_rig_of_ones_own_is_read_on_the_terminal(width: str) -> None:
+    done = CliRunner().invoke(app, ["backlash"], env={"COLUMNS": width})
+    assert done.exit_code == 0 and max(map(len, done.output.splitlines())) <= int(width)
+    words = " ".join(done.output.split())
+    for part in ("at slots of a rig of your own", "contact", "input", "by hand", "not dead_zone"):
+        assert part in words, words
+
+
 def test_a_wrong_name_is_told_with_all_of_them() -> None:
     error = CliRunner().invoke(app, ["valve_leg"]).exception
     assert isinstance(error, InputError) and "did you mean 'valve_lag'?" in str(error)

@@ -6,14 +6,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pneumo_ros.effects.guide import displayed
 from pneumo_ros.effects.parameters import family_of
+from pneumo_ros.effects.sheet import check_words
 from pneumo_ros.slots import Contact, Flow, Force, Input, Sensor
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
+from pneumo_ros.slots.guides import GUIDES
 from pneumo_ros.slots.kinds import Slot
-from pneumo_ros.slots.laws import LAWS, Measures
-from pneumo_ros.slots.library import effects_of, families_of
+from pneumo_ros.slots.laws import LAWS, Law, Measures
+from pneumo_ros.slots.library import SlotEffect, effects_of, families_of
 from pneumo_ros.slots.shapes import CONES, ROWS
 
 SCALES = fo.scales_of(np.linspace(-0.01, 0.01, 200), np.linspace(-0.1, 0.1, 200), np.zeros(200), 1.0)
@@ -123,3 +126,19 @@ def test_laws_have_one_id_each_and_sizes_that_vanish() -> None:
         for knob in law.knobs:
             typical = knob.typical(MEASURES)
             assert typical > 0.0 and knob.low <= 1.0 <= knob.high, (law.id, knob.name)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.id)
+def test_every_family_says_how_to_check_it_by_hand(law: Law) -> None:
+    guide = GUIDES[family_of(law.id)]
+    assert guide.meaning.endswith(".") and len(guide.check) > 40 and guide.names() <= {"size"}
+    assert guide.mistaken_for and set(guide.mistaken_for) <= set(GUIDES) - {family_of(law.id)}
+    slot = next(slot for slot in KINDS if slot.kind in law.kinds)
+    effect = effects_of([slot], {slot.place: MEASURES})[law.id]
+    said = check_words(effect)
+    assert "{" not in said and all(word in said for word in _size_of(effect)), "the law's own value, where one is told"
+
+
+def _size_of(effect: SlotEffect) -> list[str]:
+    told = effect.guide is not None and effect.guide.names()
+    return [displayed(effect.parameters[0].typical, effect.parameters[0].unit)] if told else []

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.judge.budgeted import DIFFERS
 from pneumo_ros.diagnosis.judge.verdict import Calibration
 from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
@@ -33,7 +34,7 @@ from pneumo_ros.diagnosis.report.words import (
     winner,
 )
 from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.sheet import check_words
+from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
 MOVED: Final = 1.0  # tolerances from which a parameter of the rig is worth telling [display]
@@ -203,13 +204,24 @@ def check(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
     several = len(entry["effects"]) > 1
     out = []
     for name in entry["effects"]:
-        effect = library.get(name)
-        if effect is None:
-            continue
-        values = {p.name: _value(entry["parameters"], name, p.name) for p in effect.parameters}
-        words = check_words(effect, {key: value for key, value in values.items() if value is not None})
+        differs = any(one["law"] == DIFFERS and name in one["effects"] for one in summary.get("budget") or [])
+        words = _by_hand({} if differs else entry["parameters"], name, library)
         out += [f"{effect_name(name)}: {words}" if several else words] if words else []
     return "; ".join(out)
+
+
+def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, Effect]) -> str:
+    """The check of the family's law that was found; '' where it has none.
+
+    ``parameters`` : that were found; none where the law differs from the library's and its numbers mean little.
+    """
+    laws = [e for e in library.values() if family_of(e.id) == family and e.guide is not None]
+    for effect in sorted(laws, key=lambda e: e.id):
+        found = {p.name: (_value(parameters, family, p.name), p.unit) for p in effect.parameters}
+        values = {key: (value, unit) for key, (value, unit) in found.items() if value is not None}
+        if effect.guide is not None and (not parameters or effect.guide.names() <= set(values)):
+            return effect.guide.check_with(values)
+    return ""
 
 
 def _value(parameters: Mapping[str, Any], effect: str, name: str) -> float | None:

@@ -158,11 +158,13 @@ def effect_name(effect: str) -> str:
 def site_words(site: str) -> str:
     """A site of an effect in words; '' for the whole rig."""
     known = {"both": "both ends", "front": "front", "rear": "rear"}
-    return known.get(site, place_words(f"sensor:{site}") if site else "")
+    if site in known or not site:
+        return known.get(site, "")
+    return place_words(f"sensor:{site}" if site in _SENSORS else site)
 
 
 def structure_words(entry: Mapping[str, Any]) -> str:
-    """Effects of an entry of the ranking with their sites: "LVDT scale (the sensor unsprung front)"."""
+    """Effects of an entry of the ranking with their sites: "LVDT scale (the front axle's LVDT)"."""
     sites = list(entry.get("sites") or [entry.get("side")] * len(entry["effects"]))
     sites += [None] * (len(entry["effects"]) - len(sites))
     parts = [

@@ -19,7 +19,7 @@ from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.quantities import readable, rounded
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
 from pneumo_ros.diagnosis.report.steps import Asked, next_steps
-from pneumo_ros.diagnosis.report.story import Known, gains, story
+from pneumo_ros.diagnosis.report.story import Known, check, gains, story
 from pneumo_ros.diagnosis.report.words import (
     closing_words,
     confidence,
@@ -27,6 +27,7 @@ from pneumo_ros.diagnosis.report.words import (
     interval,
     place_words,
     sentence,
+    site_words,
     whole_percents,
 )
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
@@ -287,6 +288,24 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     assert dict(first.facts)["how big"] == "leak area 0.4000 ± 0.0010 mm²"
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"
+
+
+def test_sites_of_any_rig_are_told_as_what_they_are() -> None:
+    told = {
+        site: site_words(site) for site in ("front", "both", "sprung_rear", "seal", "sensor:force", "input:drive", "")
+    }
+    assert told == {"front": "front", "both": "both ends", "sprung_rear": "the LVDT at the body's rear",
+                    "seal": "the slot seal", "sensor:force": "the sensor force", "input:drive": "the input drive",
+                    "": ""}  # fmt: skip
+
+
+def test_a_law_of_another_kind_is_checked_against_its_measured_curve() -> None:
+    """What a law's own number says little about, where its family's shape does most of it."""
+    found = findings()
+    plain, other = (
+        check({**found.summary, "budget": [{"effects": ["leak"], "law": law}]}, LIBRARY) for law in ("leak", "differs")
+    )
+    assert "0.41 mm2" in plain and "measured curve" in other and "mm2" not in other
 
 
 def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
