@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What effects that are not there win by: the null distribution behind the thresholds of gap/selection.py.
+"""What effects that are not there win by: the null distribution behind the thresholds of diagnosis/search/selection.py.
 
 Each seed draws a rig inside its tolerances, simulates two logs of it (sensor noise, commands that jump between the
 rows as the logs of a 1 kHz controller do) and lets the competition run: once with no effect (what does the best single

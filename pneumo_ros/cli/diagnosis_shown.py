@@ -43,12 +43,13 @@ def show(console: Console, found: Diagnosis, first: Story) -> None:
 def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
     from pneumo_ros.cli.tables import simple_table
     from pneumo_ros.diagnosis.report.budget import budget_rows
+    from pneumo_ros.diagnosis.result import DIFFERS
 
     rows = []
     for row in budget_rows(summary):
         entry = row.get("entry", {})
         probability = f"{entry['probability']:.2f}" if entry else ""
-        law = {"": "", "differs": "another than the library's"}.get(str(entry.get("law", "")), "the library's")
+        law = {"": "", DIFFERS: "another than the library's"}.get(str(entry.get("law", "")), "the library's")
         rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
     console.print(simple_table(("of the gap", "share", "law", "probability"), rows))
 

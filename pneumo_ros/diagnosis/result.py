@@ -19,6 +19,7 @@ from pneumo_ros.files import new_file
 
 ROAD_FILE: Final = "next_experiment_road.csv"  # name of a file beside the report [definition]
 VALVE_FILE: Final = "next_experiment_valves.csv"  # name of a file beside the report [definition]
+DIFFERS: Final = "differs"  # law of an effect whose shape is needed beside its law [definition]
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class BudgetEntry:
     effects : ids of the mechanism
     side, places : where it acts
     share, share_ci90 : of the squared nominal gap, averaged over the orders in which effects can be added
-    law : id of the library's law, or "differs" where the family's shape closes more than its law
+    law : id of the library's law, or :data:`DIFFERS` where the family's shape closes more than its law
     probability : that the effect is in the structure, whatever else is
     curve : the law as measured, None where it has none
     """

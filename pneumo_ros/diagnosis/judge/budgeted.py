@@ -18,12 +18,11 @@ from pneumo_ros.diagnosis.judge.closable import Remainder as Closing
 from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import HasCurves
-from pneumo_ros.diagnosis.result import BudgetEntry, Remainder
+from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry, Remainder
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.effects.parameters import Active, Curve, family_of
 
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
-DIFFERS: Final = "differs"  # law of an effect whose shape is needed beside its law [definition]
 
 
 @dataclass(frozen=True)

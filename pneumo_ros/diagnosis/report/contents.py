@@ -28,6 +28,7 @@ from pneumo_ros.diagnosis.report.words import (
     whole_percents,
     winner,
 )
+from pneumo_ros.diagnosis.result import DIFFERS
 from pneumo_ros.diagnosis.where import Law
 
 ZOOM: Final = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off [display]
@@ -141,7 +142,7 @@ def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
         held = row["entry"] if row["kind"] == "effect" else summary["remainder"] if row["kind"] == "rest" else {}
         if held.get("curve"):
             law = str(held.get("law", ""))
-            known = "no law of the library" if law in ("", "differs") else "as the library's law has it"
+            known = "no law of the library" if law in ("", DIFFERS) else "as the library's law has it"
             out.append({"plot": curve_plot(held["curve"]), "text": sentence(f"{row['words']}: {known}")})
     return out
 

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.judge.budgeted import DIFFERS
 from pneumo_ros.diagnosis.judge.verdict import Calibration
 from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
 from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
@@ -33,6 +32,7 @@ from pneumo_ros.diagnosis.report.words import (
     whole_percents,
     winner,
 )
+from pneumo_ros.diagnosis.result import DIFFERS
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.parameters import family_of
 

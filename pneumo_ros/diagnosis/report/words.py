@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from pneumo_ros.diagnosis.result import DIFFERS
 from pneumo_ros.diagnosis.signals.types import NO_VERDICT
 
 SURE: Final = 0.9  # probability from which the page says "sure" [display]
@@ -28,7 +29,11 @@ def headline(summary: Mapping[str, Any], phrases: Mapping[str, str]) -> str:
         return f"Something that no listed effect explains, at {first_place(summary) or 'a place that is not clear'}."
     entry = winner(summary)
     sides = entry.get("sites") or [entry.get("side")] * len(entry["effects"])
-    parts = [_effect_words(effect, side, phrases) for effect, side in zip(entry["effects"], sides, strict=False)]
+    laws = {effect: str(one.get("law", "")) for one in summary.get("budget") or [] for effect in one["effects"]}
+    parts = [
+        _effect_words(_law_words(effect, laws.get(effect, ""), phrases), side)
+        for effect, side in zip(entry["effects"], sides, strict=False)
+    ]
     return sentence("; and ".join(parts))
 
 
@@ -106,8 +111,14 @@ def winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
     return next((entry for entry in ranking if set(entry["effects"]) == wanted), ranking[0])
 
 
-def _effect_words(effect: str, side: str | None, phrases: Mapping[str, str]) -> str:
-    what = phrases.get(effect, effect.replace("_", " "))
+def _law_words(effect: str, law: str, phrases: Mapping[str, str]) -> str:
+    """A family as the law that was found has it."""
+    if law == DIFFERS:
+        return f"{effect_name(effect)} by a law of its own"
+    return phrases.get(law) or phrases.get(effect) or effect.replace("_", " ")
+
+
+def _effect_words(what: str, side: str | None) -> str:
     where = {"both": "at both ends", "front": "at the front", "rear": "at the rear"}.get(side or "")
     if where is None:
         return f"{what}: {site_words(side)}" if side else what

@@ -151,6 +151,9 @@ def test_a_pair_is_named_with_both_effects() -> None:
     summary["ranking"] = [{**summary["ranking"][0], "effects": ["leak", "valve_lag"], "sites": ["front", "both"]}]
     words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve"})
     assert words == "At the front, a leak; and at both ends, a slow valve."
+    summary["budget"] = [{"effects": ["leak"], "law": "differs"}, {"effects": ["valve_lag"], "law": "valve_lag.second"}]
+    words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve", "valve_lag.second": "a valve that rings"})
+    assert words == "At the front, leak by a law of its own; and at both ends, a valve that rings."
 
 
 def test_every_verdict_says_what_to_do_next() -> None:
