@@ -37,6 +37,7 @@ from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
+OFTEN: Final = 0.05  # of the density where a log was most often, from which a measured law is told there [display]
 MOVED: Final = 1.0  # tolerances from which a parameter of the rig is worth telling [display]
 
 
@@ -129,7 +130,7 @@ def story(summary: Mapping[str, Any], known: Known) -> Story:
 def _named(summary: Mapping[str, Any], known: Known) -> list[tuple[str, str]]:
     return [
         ("where", places(summary)),
-        ("how big", ", ".join(_sizes(summary))),
+        ("how big", ", ".join(_sizes(summary, known.library))),
         ("mends", _mended(known.gains)),
         ("by hand", check(summary, known.library)),
         ("or else", _rivals(summary, known.library)),
@@ -171,10 +172,18 @@ def places(summary: Mapping[str, Any]) -> str:
     return f"{', '.join(words)} of the gap"
 
 
-def _sizes(summary: Mapping[str, Any]) -> list[str]:
-    """Parameters that the log determines; beside a shape the law's own are often not."""
-    found = {name: value for name, value in winner(summary)["parameters"].items() if _determined(value)}
-    words = [f"{name.replace('_', ' ')} {quantity_words(name, value)}" for name, value in found.items()]
+def _sizes(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> list[str]:
+    """Of each effect the parameters that the log determines; of a law of another kind what was measured of it."""
+    entry = winner(summary)
+    curves = {one["family"]: one["curve"] for one in summary.get("budget") or []
+              if one["law"] == DIFFERS and one.get("curve")}  # fmt: skip
+    words = [f"{effect_name(family)} as measured, {_curve_words(curve)}" for family, curve in curves.items()]
+    plain = [e for e in library.values() if family_of(e.id) in set(entry["effects"]) - set(curves)]
+    own = tuple(p.name for e in plain for p in e.parameters)
+    for name, quantity in entry["parameters"].items():
+        # Beside a measured law its own numbers and those of its shape say little.
+        if _determined(quantity) and (not curves or name.endswith(own)):
+            words.append(f"{name.replace('_', ' ')} {quantity_words(name, quantity)}")
     return words or ["no single number: the law as measured is in the report"]
 
 
@@ -321,13 +330,19 @@ def measured(summary: Mapping[str, Any]) -> str:
     curve = rest.get("curve")
     if not curve:
         return ""
-    points = np.asarray(curve["points"], dtype=float)[:, :2]
-    x, y = curve["x"], curve["y"]
-    (along, x_factor), (up, y_factor) = (readable(axis["unit"], points[:, k]) for k, axis in enumerate((x, y)))
     at = " and ".join(place_words(place) for place in rest["places"])
-    low, high = points[0] * (x_factor, y_factor), points[-1] * (x_factor, y_factor)
-    return (f"at {at}, {y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
-            f"{high[1]:.3g} {up} at {high[0]:.3g} {along}; its curve is in the report")  # fmt: skip
+    return f"at {at}, {_curve_words(curve)}; its curve is in the report"
+
+
+def _curve_words(curve: Mapping[str, Any]) -> str:
+    """A measured law at both ends of where the log was often: "force over rate: 2 N at -15 mm/s, -18 N at 13 mm/s"."""
+    points = np.asarray(curve["points"], dtype=float)
+    often = points[points[:, 4] >= OFTEN * points[:, 4].max()] if points.shape[1] > 4 else points
+    x, y = curve["x"], curve["y"]
+    (along, x_factor), (up, y_factor) = (readable(axis["unit"], often[:, k]) for k, axis in enumerate((x, y)))
+    low, high = often[0, :2] * (x_factor, y_factor), often[-1, :2] * (x_factor, y_factor)
+    return (f"{y['name']} over {x['name']} {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
+            f"{high[1]:.3g} {up} at {high[0]:.3g} {along}")  # fmt: skip
 
 
 def unseen(summary: Mapping[str, Any]) -> str:

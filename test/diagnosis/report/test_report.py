@@ -311,6 +311,23 @@ def test_a_law_of_another_kind_is_checked_against_its_measured_curve() -> None:
     assert "0.41 mm2" in plain and "measured curve" in other and "mm2" not in other
 
 
+def test_a_law_of_another_kind_is_as_big_as_its_measured_curve() -> None:
+    """The ends of the curve are those where the log often was; its own numbers say little."""
+    found = findings()
+    curve = {"x": {"name": "pressure", "unit": "Pa"}, "y": {"name": "flow", "unit": "kg/s"},
+             "points": [[1e5, 9.0, 8.0, 9.9, 0.001], [2e5, 0.004, 0.003, 0.005, 0.5],
+                        [3e5, 0.01, 0.0, 0.1, 0.4]]}  # fmt: skip
+    best = found.summary["ranking"][0]
+    parameters = {**best["parameters"], "slider 2": {"value": 2.0, "std": 0.1, "unit": "N"}}
+    summary = {
+        **found.summary,
+        "ranking": [{**best, "parameters": parameters}],
+        "budget": [{"effects": ["leak"], "family": "leak", "law": "differs", "curve": curve}],
+    }
+    facts = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)
+    assert facts["how big"] == "leak as measured, flow over pressure 4 g/s at 200 kPa, 10 g/s at 300 kPa"
+
+
 def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
     found = findings()
     said = story(found.summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))
