@@ -341,7 +341,7 @@ def _curve_words(curve: Mapping[str, Any]) -> str:
     x, y = curve["x"], curve["y"]
     (along, x_factor), (up, y_factor) = (readable(axis["unit"], often[:, k]) for k, axis in enumerate((x, y)))
     low, high = often[0, :2] * (x_factor, y_factor), often[-1, :2] * (x_factor, y_factor)
-    return (f"{y['name']} over {x['name']} {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
+    return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
             f"{high[1]:.3g} {up} at {high[0]:.3g} {along}")  # fmt: skip
 
 

@@ -325,7 +325,7 @@ def test_a_law_of_another_kind_is_as_big_as_its_measured_curve() -> None:
         "budget": [{"effects": ["leak"], "family": "leak", "law": "differs", "curve": curve}],
     }
     facts = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)
-    assert facts["how big"] == "leak as measured, flow over pressure 4 g/s at 200 kPa, 10 g/s at 300 kPa"
+    assert facts["how big"] == "leak as measured, flow over pressure: 4 g/s at 200 kPa, 10 g/s at 300 kPa"
 
 
 def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
