@@ -20,7 +20,7 @@ from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import HasCurves
 from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry, Remainder
 from pneumo_ros.diagnosis.search.fitting import of_law
-from pneumo_ros.effects.parameters import Active, Curve, family_of
+from pneumo_ros.effects.parameters import ANYTHING, Active, Curve, family_of
 
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 
@@ -56,10 +56,15 @@ def _entry(outcome: Outcome, opinion: Opinion, found: Budget, law: Part, cov: Ar
 
 
 def measured_curve(problem: Problem, one: Fit, record: object, parts: Sequence[Part], cov: Array) -> Curve | None:
-    """Curve of some parts of a fitted structure with the band that the covariance of its scaled unknowns gives."""
+    """Curve of an effect's parts in a fitted structure with the band that the covariance of its scaled unknowns gives.
+
+    Of whatever may act at several places that of the first: a force and a flow have no curve together.
+    """
     model = problem.model
     if not isinstance(model, HasCurves) or not parts:
         return None
+    if family_of(parts[0][0]) == ANYTHING:
+        parts = parts[:1]
     active = problem.active(one.candidate, problem.values(one.candidate, one.x))
     own: list[Active] = []
     columns: list[int] = []
