@@ -7,8 +7,7 @@ All times are monotonic, ns.
 
 from __future__ import annotations
 
-import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from pneumo_ros.daq.actuation import SECOND, WRAP, Mode
 from pneumo_ros.daq.calibration import Calibration
@@ -16,35 +15,15 @@ from pneumo_ros.daq.frames import DeviceFault, DeviceState, Hello, Sample, Sampl
 from pneumo_ros.daq.intake import MISFITS
 from pneumo_ros.daq.link import COMPLAINT_EVERY, HELLO_EVERY, REFUSED_EVERY, Link, Phase
 from pneumo_ros.daq.reasons import Finding, Level, Reason
-from pneumo_ros.daq.safety_config import SafetyConfig
-from pneumo_ros.rig import Rig
 
 UNWATCHED = SECOND // 10  # without a tick, after which no command passes: nobody is watching the timeouts
 
 
 class DriverCore(Link):
-    """One rig's driver.
+    """One rig's driver; parameters as of :class:`~pneumo_ros.daq.link.Link`."""
 
-    Parameters
-    ----------
-    safety, calibration, rig : configuration
-    send : writes bytes to the port without blocking
-    discard : throws away bytes that have not left the host yet
-    draw : the handshakes' nonces; another in each session, so that no answer recorded before fits
-    """
-
-    def __init__(
-        self,
-        safety: SafetyConfig,
-        calibration: Calibration,
-        rig: Rig,
-        send: Callable[[bytes], None],
-        discard: Callable[[], None] = lambda: None,
-        draw: Callable[[], int] = lambda: secrets.randbits(32),
-    ) -> None:
-        super().__init__(safety, calibration, rig, send, discard, draw)
-        self._last_complaint = -COMPLAINT_EVERY
-        self._last_tick = 0
+    _last_complaint = -COMPLAINT_EVERY
+    _last_tick = 0
 
     def receive(self, data: bytes, now: int) -> None:
         """Bytes from the board, complete at ``now``."""

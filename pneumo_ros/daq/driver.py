@@ -114,12 +114,11 @@ class SerialDriver:
 
     def arm(self, timeout: float = 1.0) -> list[str]:
         """Arm the valves and wait for the board to follow; returns why not."""
-        why = self._do(self.core.arm)
-        if why:
+        why = self._ask(self.core.arm, Mode.ARMING, timeout)
+        if why or self.core.mode is Mode.ARMED:
             return why
-        self.wait_for(lambda core: core.mode is not Mode.ARMING, timeout)
         trip = self.core.trip
-        return [] if self.core.mode is Mode.ARMED else [trip.message if trip else "the board did not arm"]
+        return [trip.message if trip else "the board did not arm"]
 
     def disarm(self) -> None:
         """Safe command."""
@@ -135,11 +134,15 @@ class SerialDriver:
 
     def reset(self, timeout: float = 1.0) -> list[str]:
         """Reset an emergency stop; returns why not."""
-        why = self._do(self.core.reset)
-        if why:
-            return why
-        self.wait_for(lambda core: core.mode is not Mode.RESETTING, timeout)
-        return [] if self.core.mode is Mode.SAFE else ["the board stays in its emergency stop"]
+        why = self._ask(self.core.reset, Mode.RESETTING, timeout)
+        return why if why or self.core.mode is Mode.SAFE else ["the board stays in its emergency stop"]
+
+    def _ask(self, request: Callable[[int], list[str]], asking: Mode, timeout: float) -> list[str]:
+        """Ask the board and wait while the answer is out; returns why it was not even asked."""
+        why = self._do(request)
+        if not why:
+            self.wait_for(lambda core: core.mode is not asking, timeout)
+        return why
 
     def averages(self, samples: int, timeout: float) -> dict[str, tuple[float, float]]:
         """Mean and standard deviation of the next samples' values by sensor name, SI, for zero and span.

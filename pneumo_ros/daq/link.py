@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Callable
 from enum import Enum
 
@@ -45,7 +46,8 @@ class Link(Reactions):
     Parameters
     ----------
     safety, calibration, rig : configuration
-    send, discard : as of :class:`Reactions`
+    send : writes bytes to the port without blocking
+    discard : throws away bytes that have not left the host yet
     draw : the handshakes' nonces; another in each session, so that no answer recorded before fits
     """
 
@@ -55,8 +57,8 @@ class Link(Reactions):
         calibration: Calibration,
         rig: Rig,
         send: Callable[[bytes], None],
-        discard: Callable[[], None],
-        draw: Callable[[], int],
+        discard: Callable[[], None] = lambda: None,
+        draw: Callable[[], int] = lambda: secrets.randbits(32),
     ) -> None:
         super().__init__(safety, send, discard)
         self.safety, self.calibration, self.rig = safety, calibration, rig

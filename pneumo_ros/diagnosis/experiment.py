@@ -8,8 +8,10 @@ what remains is compared with the sensors' noise.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -20,30 +22,53 @@ SEPARATES: Final = 2.0  # noise standard deviations, rms, from which an experime
 STEP: Final = 0.5  # prior sigmas by which a nuisance parameter is moved to see its answer [numerics]
 
 
-class NextExperiment(Protocol):
-    """A profile that was chosen among others."""
+@dataclass(frozen=True)
+class NextExperiment(ABC):
+    """A profile that was chosen among others.
+
+    Attributes
+    ----------
+    separation, separation_now : rms difference of the rivals' outputs over the noise, nuisance parameters answered: on
+        the profile, and on the log that was given
+    chosen_from : profiles that were tried
+    kind : of profiles, for people
+    """
+
+    name: str
+    description: str
+    separation: float
+    separation_now: float
+    chosen_from: int = field(default=1, kw_only=True)
+    kind: ClassVar[str]
 
     @property
     def tells(self) -> bool:
         """Whether it is worth playing: below :data:`SEPARATES` it would cost an hour and tell nothing."""
+        return self.separation >= SEPARATES
 
     @property
     def refusal(self) -> str:
         """Why it is not offered, for people."""
+        best = (
+            f"of {self.chosen_from} {self.kind} the best, {self.name}, would drive the rivals {self.separation:.2g} "
+            "standard deviations of the noise"
+        )
+        return (
+            f"no experiment is offered: {best} apart, and {SEPARATES:g} are needed; the check by hand tells them apart"
+        )
 
+    @property
+    def aim(self) -> str:
+        """What it is and what it separates, for people."""
+        return f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)"
+
+    @abstractmethod
     def write(self, folder: Path) -> list[Path]:
         """The profile as tables in a folder."""
 
+    @abstractmethod
     def to_json(self) -> dict[str, Any]:
         """Without the profile, which has files of its own."""
-
-
-def refusal(kind: str, count: int, name: str, separation: float) -> str:
-    """Why an experiment is not offered."""
-    best = (
-        f"of {count} {kind} the best, {name}, would drive the rivals {separation:.2g} standard deviations of the noise"
-    )
-    return f"no experiment is offered: {best} apart, and {SEPARATES:g} are needed; the check by hand tells them apart"
 
 
 def separation(problem: Problem, best: Fit, rival: Fit, record: Any) -> float:

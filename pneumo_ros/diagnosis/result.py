@@ -8,12 +8,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.experiment import SEPARATES, NextExperiment, refusal
+from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
@@ -175,29 +175,15 @@ def curve_json(curve: Curve | None) -> dict[str, Any] | None:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class Experiment(NextExperiment):
     """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
     apart.
     """
 
-    name: str
-    description: str
-    separation: float  # rms difference of the rivals' outputs over the noise, nuisance parameters answered
-    separation_now: float  # the same on the log that was given
     time: Array  # (N,) s
     road: Array  # (N, 2) m
     valves: Array  # (N, 4) m2
-    chosen_from: int = 1  # profiles that were tried
-
-    @property
-    def tells(self) -> bool:
-        """Whether it is worth playing: below :data:`SEPARATES` it would cost an hour and tell nothing."""
-        return self.separation >= SEPARATES
-
-    @property
-    def refusal(self) -> str:
-        """Why it is not offered, for people."""
-        return refusal("road and valve profiles", self.chosen_from, self.name, self.separation)
+    kind: ClassVar[str] = "road and valve profiles"
 
     def write(self, folder: Path) -> list[Path]:
         """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""
@@ -219,9 +205,8 @@ class Experiment:
 
     def to_json(self) -> dict[str, Any]:
         """Without the profile, which has files of its own."""
-        aim = f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)"
         return {
-            "text": f"{aim}; {self.command()} plays it",
+            "text": f"{self.aim}; {self.command()} plays it",
             "command": self.command(),
             "file": ROAD_FILE,
             "valve_file": VALVE_FILE,

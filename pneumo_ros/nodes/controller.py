@@ -15,11 +15,11 @@ from pneumo_ros.control.half_car import PARAMETERS as CONTROL_PARAMETERS
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder
-from pneumo_ros.nodes.base import ERROR, WARN, RigNode
+from pneumo_ros.nodes.base import ERROR, WARN
 from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.nodes.stage import StageNode
 from pneumo_ros.parameters import Parameter, Value
-from pneumo_ros.rig import load_rig
-from pneumo_ros.session.stages import ControllerStage, Progress, advance
+from pneumo_ros.session.stages import ControllerStage
 
 PARAMETERS: tuple[Parameter, ...] = (
     *CONTROL_PARAMETERS,
@@ -31,7 +31,7 @@ PARAMETERS: tuple[Parameter, ...] = (
 WATCH_PERIOD = 0.004  # s between looks at the estimate's age, real time only
 
 
-class ControllerNode(RigNode):
+class ControllerNode(StageNode[ControllerStage]):
     """Thin shell over :class:`~pneumo_ros.session.stages.ControllerStage`: a controller, or a valve profile.
 
     In real time it is the first of three watchdogs: without a fresh estimate it sends the safe command, whatever the
@@ -39,11 +39,7 @@ class ControllerNode(RigNode):
     """
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("controller", PARAMETERS, context=context, overrides=overrides)
-        self.rig = load_rig(self.values["rig"] or None)
-        self.stage = self._build()
-        self.stage.warm_up()
-        self.progress: Progress | None = None
+        super().__init__("controller", PARAMETERS, ControllerStage, context, overrides)
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
         self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
         self._publish = self.publisher(topics.COMMAND).publish
@@ -59,13 +55,6 @@ class ControllerNode(RigNode):
             self.steady_timer(WATCH_PERIOD, self._watch)
         self.subscribe(topics.ESTIMATE, self._on_estimate)
 
-    def _build(self) -> ControllerStage:
-        return ControllerStage(self.rig, self.period_ns * 1e-9, self.values)
-
-    def on_parameters(self, changed: Mapping[str, Value]) -> None:
-        """Rebuild with the new gains; the state goes on, so a change is bumpless."""
-        self.stage = self._build()
-
     def publish_setup(self) -> None:
         """Parameters, and which profile is played."""
         super().publish_setup()
@@ -79,7 +68,7 @@ class ControllerNode(RigNode):
         if stamp <= self._said and stamp > self._last_stamp:
             return  # the safe command has overtaken this sample; a command's stamp never goes back
         self._last_ns, self._last_stamp, self._stale = start, stamp, False
-        self.progress, output = advance(self.stage, self.progress, stamp, estimate, self.period_ns)
+        output = self.advance(stamp, estimate)
         if output.refused:
             self._say_refused(stamp)
         self._said = stamp

@@ -12,22 +12,17 @@ from rclpy.context import Context
 from pneumo_ros.estimation.half_car import PARAMETERS
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder, decode_pressure
-from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.spin import node_main
+from pneumo_ros.nodes.stage import StageNode
 from pneumo_ros.parameters import Value
-from pneumo_ros.rig import load_rig
-from pneumo_ros.session.stages import EstimatorStage, Progress, advance
+from pneumo_ros.session.stages import EstimatorStage
 
 
-class EstimatorNode(RigNode):
+class EstimatorNode(StageNode[EstimatorStage]):
     """Thin shell over :class:`~pneumo_ros.session.stages.EstimatorStage`."""
 
     def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("estimator", PARAMETERS, context=context, overrides=overrides)
-        self.rig = load_rig(self.values["rig"] or None)
-        self.stage = self._build()
-        self.stage.warm_up()
-        self.progress: Progress | None = None
+        super().__init__("estimator", PARAMETERS, EstimatorStage, context, overrides)
         self._sample = np.zeros(6)
         self._stamps = [0, 0, 0]
         self._encode = JointEncoder(topics.ESTIMATE.frame_id, topics.ESTIMATE.names).encode_array
@@ -36,13 +31,6 @@ class EstimatorNode(RigNode):
         self.subscribe(topics.DISPLACEMENT, self._on_displacement)
         self.subscribe(topics.FRONT_PRESSURE, lambda data: self._on_pressure(1, data))
         self.subscribe(topics.REAR_PRESSURE, lambda data: self._on_pressure(2, data))
-
-    def _build(self) -> EstimatorStage:
-        return EstimatorStage(self.rig, self.period_ns * 1e-9, self.values)
-
-    def on_parameters(self, changed: Mapping[str, Value]) -> None:
-        """Rebuild with the new gains; the state goes on."""
-        self.stage = self._build()
 
     def _on_displacement(self, data: bytes) -> None:
         self._stamps[0], self._sample[:4] = self._read(data)
@@ -58,8 +46,7 @@ class EstimatorNode(RigNode):
         if stamp != self._stamps[1] or stamp != self._stamps[2]:
             return
         start = time.monotonic_ns()
-        self.progress, output = advance(self.stage, self.progress, stamp, self._sample, self.period_ns)
-        self._publish(self._encode(stamp, output.values))
+        self._publish(self._encode(stamp, self.advance(stamp, self._sample).values))
         self.timed(start)
 
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.experiment import SEPARATES, refusal, separation
+from pneumo_ros.diagnosis.experiment import NextExperiment, separation
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.files import new_file
@@ -66,35 +66,19 @@ SHAPES = (
 
 
 @dataclass(frozen=True)
-class OwnExperiment:
+class OwnExperiment(NextExperiment):
     """A course of the inputs with how far it drives the rivals apart.
 
     Attributes
     ----------
-    separation, separation_now : of the rivals, in noise standard deviations, on it and on the log that was given
     time, inputs : (N,) s, (N, U) in the log's own units
     names : of the log's columns, with their units
-    chosen_from : profiles that were tried
     """
 
-    name: str
-    description: str
-    separation: float
-    separation_now: float
     time: Array
     inputs: Array
     names: tuple[str, ...]
-    chosen_from: int
-
-    @property
-    def tells(self) -> bool:
-        """Whether it is worth driving."""
-        return self.separation >= SEPARATES
-
-    @property
-    def refusal(self) -> str:
-        """Why it is not offered, for people."""
-        return refusal("courses of the inputs", self.chosen_from, self.name, self.separation)
+    kind: ClassVar[str] = "courses of the inputs"
 
     def write(self, folder: Path) -> list[Path]:
         """The course as a table."""
@@ -105,8 +89,8 @@ class OwnExperiment:
 
     def to_json(self) -> dict[str, Any]:
         """Without the course, which has a file of its own."""
-        aim = f"{self.description} (separates the rivals to {self.separation:.0f} noise standard deviations)"
-        return {"text": f"{aim}; {FILE} holds it", "file": FILE, "name": self.name, "description": self.description,
+        text = f"{self.aim}; {FILE} holds it"
+        return {"text": text, "file": FILE, "name": self.name, "description": self.description,
                 "separation": self.separation, "separation_now": self.separation_now}  # fmt: skip
 
 
@@ -124,7 +108,7 @@ def design_own(problem: Problem, best: Fit, rival: Fit) -> OwnExperiment | None:
     inputs = np.column_stack([(record.inputs[:, k] - s.shift) / s.scale for k, s in specs])
     names = tuple(f"{s.field} ({s.unit})" for _, s in specs)
     now = separation(problem, best, rival, log)
-    return OwnExperiment(name, says, found, now, record.time, inputs, names, len(tried))
+    return OwnExperiment(name, says, found, now, record.time, inputs, names, chosen_from=len(tried))
 
 
 def courses(model: OwnRig, log: OwnRecord) -> Iterator[tuple[str, str, OwnRecord]]:

@@ -188,7 +188,6 @@ def test_web_sockets_of_ones_own_making_open_no_more_tabs_than_pages_do(log_path
         assert fetch(bare, Cookie=f"pneumo_token={token}") == 503
 
 
-@pytest.mark.realtime
 @pytest.mark.slow
 def test_a_log_plays_in_the_browser(log_path: Path) -> None:
     with served(str(log_path)) as (url, _), browser() as tab:
@@ -213,7 +212,6 @@ walk(document); return [document.documentElement.scrollWidth, lefts];
 """
 
 
-@pytest.mark.realtime
 @pytest.mark.slow
 @pytest.mark.parametrize("overlay", [False, True])
 def test_pages_fit_a_telephone_and_a_screen(log_path: Path, overlay: bool) -> None:
@@ -240,7 +238,6 @@ def line_with(words: str, stream: IO[str], seconds: float) -> bool:
     return found.wait(seconds)
 
 
-@pytest.mark.realtime
 @pytest.mark.slow
 def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
     """One real session: the red button closes the valves, a gain changes, and the page stays when the session ends."""
@@ -266,7 +263,7 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.wait(lambda: tab.model("estop", "disabled"), "the red button to end with its session")
         tab.wait(lambda: max(tab.drawn(), default=0) > 5000, "the last samples to stay")
         assert process.poll() is None and process.stdout is not None
-        assert line_with("the dashboard stays", process.stdout, 60.0)
+        assert line_with("the dashboard stays", process.stdout, 120.0)
     log = read_log(path)
     codes = [event.code for event in read_events(log)]
     assert "estop" in codes and "parameter_changed" in codes

@@ -63,7 +63,6 @@ def test_there_are_two_hundred_texts() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.realtime
 def test_the_page_shows_them_and_runs_none(log_path: Path) -> None:
     from test_dashboard import served  # type: ignore[import-not-found]
 

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
+from helpers import emulators
 from helpers.serial_rig import CALIBRATION
 from pneumo_ros.daq.actuation import Mode
 from pneumo_ros.nodes.daq import DaqNode
@@ -156,21 +156,14 @@ class Bench:
 def emulator(folder: Path) -> Iterator[tuple[Path, Callable[[], None], Callable[[], None]]]:
     """(link, start, stop) of an emulated rig; started."""
     link = folder / "rig"
-    command = [sys.executable, "-m", "pneumo_ros.cli.emulate", "--quiet", "--link", str(link),
-               "--calibration", CALIBRATION, "--road", "flat"]  # fmt: skip
-    running: list[subprocess.Popen[bytes]] = []
+    running: list[BaseProcess] = []
 
     def start() -> None:
-        running.append(subprocess.Popen(command))
-        end = time.monotonic() + 60
-        while not link.is_symlink():
-            assert running[-1].poll() is None and time.monotonic() < end
-            time.sleep(0.02)
+        running.append(emulators.started(link, "--calibration", CALIBRATION, "--road", "flat"))
 
     def stop() -> None:
         while running:
-            running[-1].terminate()
-            running.pop().wait(30)
+            emulators.ended(running.pop())
 
     start()
     try:

@@ -14,12 +14,13 @@ PERIOD, NOISE = 2e-3, 1e-3
 
 @dataclass(frozen=True)
 class DrivenLog:
-    """One output with white noise of NOISE, no sample missing."""
+    """One output with white noise, no sample missing."""
 
     measured: Array
     drive: Array
     name: str = "plant"
     period: float = PERIOD
+    noise_std: float = NOISE
 
     @property
     def weight(self) -> Array:
@@ -27,7 +28,7 @@ class DrivenLog:
 
     @property
     def noise(self) -> Array:
-        return np.array([NOISE])
+        return np.array([self.noise_std])
 
     def slice(self, first: int, last: int) -> DrivenLog:
         return replace(self, measured=self.measured[first:last], drive=self.drive[first:last])

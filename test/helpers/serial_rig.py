@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from helpers import emulators
 from pneumo_ros.control import half_car as control
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.core import DriverCore
@@ -84,8 +83,7 @@ class SerialRig:
         self.measurements: list[Measurement] = []
         self.events: list[Event] = []
         self.stalls_ns: list[int] = []
-        self._command = [
-            sys.executable, "-m", "pneumo_ros.cli.emulate", "--quiet", "--link", str(self.link),
+        self._words = [
             "--record", str(self.record_path), "--calibration", calibration,
             *(word for fault in faults for word in ("--fault", fault)), *arguments,
         ]  # fmt: skip
@@ -113,21 +111,10 @@ class SerialRig:
             self.truth = Truth(self.record_path)
 
     def start_emulator(self) -> None:
-        self._emulator = subprocess.Popen(self._command)
-        end = time.monotonic() + 60.0
-        while not self.link.is_symlink():
-            if self._emulator.poll() is not None or time.monotonic() > end:
-                self.stop_emulator()
-                raise AssertionError("the emulator did not start")
-            time.sleep(0.02)
+        self._emulator = emulators.started(self.link, *self._words)
 
     def stop_emulator(self) -> None:
-        self._emulator.terminate()
-        try:
-            self._emulator.wait(30)
-        except subprocess.TimeoutExpired:
-            self._emulator.kill()
-            self._emulator.wait()
+        emulators.ended(self._emulator)
 
     def arm(self, timeout: float = 15.0) -> None:
         """Arm as soon as nothing speaks against it."""

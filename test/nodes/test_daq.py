@@ -7,8 +7,6 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ import rclpy
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from helpers import sessions
+from helpers.emulators import emulated
 from helpers.serial_rig import CALIBRATION, Truth
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -43,28 +42,17 @@ RATE = 250  # Hz; five processes of a session and the emulator share the cores w
 TRIES = 3  # sessions that a stall of this computer tripped before the scenario
 
 
-@contextmanager
-def emulated(folder: Path, *arguments: str, calibration: str = CALIBRATION) -> Iterator[Path]:
-    """An emulated rig in a process of its own; gives its link."""
-    link = folder / "rig"
-    command = [sys.executable, "-m", "pneumo_ros.cli.emulate", "--quiet", "--link", str(link), "--record",
-               str(folder / "record.npz"), "--calibration", calibration, *arguments]  # fmt: skip
-    process = subprocess.Popen(command)
-    try:
-        while not link.is_symlink():
-            assert process.poll() is None
-            time.sleep(0.02)
-        yield link
-    finally:
-        process.terminate()
-        process.wait(30)
+def board(folder: Path, *words: str) -> tuple[str, ...]:
+    """Words of an emulated rig that writes its record into a folder."""
+    return ("--record", str(folder / "record.npz"), "--calibration", CALIBRATION, *words)
 
 
-def session(folder: Path, duration: float, *arguments: str, calibration: str = CALIBRATION) -> tuple[int, str, Log]:
+def session(folder: Path, duration: float, *arguments: str) -> tuple[int, str, Log]:
     """`pneumo run --source serial` against an emulated rig."""
-    with emulated(folder, *arguments, calibration=calibration) as link:
+    link = folder / "rig"
+    with emulated(link, *board(folder, *arguments)):
         code, said = sessions.run(
-            "--source", "serial", "--port", str(link), "--calibration", calibration, "--duration", str(duration),
+            "--source", "serial", "--port", str(link), "--calibration", CALIBRATION, "--duration", str(duration),
             "--output", str(folder / "session.mcap"), "--no-picture", "--rate", str(RATE),
         )  # fmt: skip
     return code, said, read_log(folder / "session.mcap")
@@ -213,8 +201,8 @@ class Operator:
 @pytest.mark.slow
 def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
     """Configure, zero, span, activate, e-stop, reset: without a session, as on the bench."""
-    domain, saved = sessions.own_domain(), tmp_path / "saved.yaml"
-    with emulated(tmp_path, "--road", "flat") as link:
+    domain, saved, link = sessions.own_domain(), tmp_path / "saved.yaml", tmp_path / "rig"
+    with emulated(link, *board(tmp_path, "--road", "flat")):
         command = [sys.executable, "-m", "pneumo_ros.nodes.daq", "--ros-args"]
         for name, value in (("port", link), ("mode", "realtime"), ("autostart", "false"),
                             ("calibration", CALIBRATION), ("session_nodes", "daq")):  # fmt: skip

@@ -159,7 +159,7 @@ def design_experiment(problem: Problem, best: Fit, rival: Fit) -> Experiment | N
     time = np.arange(len(record.measured)) * record.period
     return Experiment(
         profile.name, profile.description, separation, now, time, np.asarray(record.road), np.asarray(record.commands),
-        len(PROFILES),
+        chosen_from=len(PROFILES),
     )  # fmt: skip
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The three calls whose arguments differ between FMI 2 and FMI 3, compiled; a status above 1 is a failure."""
+"""The three calls whose arguments differ between FMI 2 and FMI 3, compiled; a status above 1 is a failure.
+
+And what both kinds of FMU make of the numbers that they got: the slots' coordinates.
+"""
 
 from __future__ import annotations
 
@@ -62,3 +65,13 @@ def step3(p: Any, time: float, h: float) -> int:
     status = int(p.step(p.instance, time, h, True, flags[0:].ctypes.data, flags[1:].ctypes.data, flags[2:].ctypes.data,
                         p.after[1:].ctypes.data))  # fmt: skip
     return 3 if flags[1] or flags[2] else status
+
+
+@compiled
+def weighted_sums(p: Any, out: Array) -> None:
+    """Coordinates (K, 3) of the slots, into ``out``: weighted sums of the numbers got last."""
+    for k in range(out.shape[0]):
+        for j in range(3):
+            out[k, j] = 0.0
+            for i in range(len(p.numbers)):
+                out[k, j] += p.weights[3 * k + j, i] * p.numbers[i]

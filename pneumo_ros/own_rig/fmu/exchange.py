@@ -15,6 +15,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.own_rig.bridge import compiled
 from pneumo_ros.own_rig.fmu.calls import get2 as get_values
 from pneumo_ros.own_rig.fmu.calls import set2 as set_values
+from pneumo_ros.own_rig.fmu.calls import weighted_sums
 
 WHOLE = 1e-9  # s that a change may lie beyond the end of a step
 
@@ -65,11 +66,7 @@ def coordinates(x: Array, u: Array, p: Any, out: Array) -> None:
         p.values[len(u) - 1 + k] = 0.0
     if drive(x, u, p) and get_values(p, p.seen, p.numbers) > 1:
         p.state[0] = 1
-    for k in range(out.shape[0]):
-        for j in range(3):
-            out[k, j] = 0.0
-            for i in range(len(p.numbers)):
-                out[k, j] += p.weights[3 * k + j, i] * p.numbers[i]
+    weighted_sums(p, out)
 
 
 @compiled

@@ -15,6 +15,7 @@ from pneumo_ros.own_rig.bridge import CHANNELS, compiled
 from pneumo_ros.own_rig.fmu.calls import get2 as get_values
 from pneumo_ros.own_rig.fmu.calls import set2 as set_values
 from pneumo_ros.own_rig.fmu.calls import step2 as step
+from pneumo_ros.own_rig.fmu.calls import weighted_sums
 from pneumo_ros.slots.flow import MEMORIES as FLOW_MEMORIES
 from pneumo_ros.slots.flow import advance as advance_flow
 from pneumo_ros.slots.flow import flow
@@ -32,11 +33,7 @@ def see(p: Any, c: Array) -> None:
     """Coordinates of the slots."""
     if p.state[0] == 0 and get_values(p, p.seen, p.numbers) > 1:
         p.state[0] = 1
-    for k in range(c.shape[0]):
-        for j in range(3):
-            c[k, j] = 0.0
-            for i in range(len(p.numbers)):
-                c[k, j] += p.weights[3 * k + j, i] * p.numbers[i]
+    weighted_sums(p, c)
 
 
 @compiled

@@ -15,6 +15,10 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, design_experiment
 from pneumo_ros.diagnosis.result import Experiment
+from pneumo_ros.diagnosis.search.competition import compete
+from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.state import Search
+from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.rig import load_rig
@@ -52,18 +56,31 @@ def test_a_leak_and_an_orifice_are_driven_apart_with_the_valves_closed(model: Ri
     assert not np.array_equal(found.valves[:, 2], np.full(len(found.valves), found.valves[0, 2])), found.name
 
 
-@pytest.mark.parametrize("separation", [0.02, 1.99, 2.0])
-def test_what_would_tell_nothing_is_not_offered(
-    model: RigModel, separation: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The rivals are given; the log's own would take minutes."""
-    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.ambiguity_group", lambda *_: ("leak", "orifice_coefficient"))
+RIVALS = Options(pairs=False, effort=replace(QUICK, finalists=4))
+
+
+@pytest.fixture(scope="module")
+def searched(model: RigModel) -> tuple[Search, list[Signals]]:
+    """What is found in the first of two logs; no search asks what experiment will be offered."""
     effect = (Active("leak", "front", (4e-7, 0.6)),)
     logs = [log(model, seed, drawn(model, 4, 0.5), effect) for seed in (1, 2)]
-    nothing = np.zeros((2, 4))
-    fake = Experiment("flat", "a flat road", separation, 0.0, np.array([0.0, 0.1]), nothing[:, :2], nothing, 10)
-    options = Options(pairs=False, effort=replace(QUICK, finalists=4), experiment=lambda *_: fake)
-    found = diagnose(model, logs[:1], logs[1], options)
+    search = compete(Problem(model, (logs[0],)), RIVALS.effort, RIVALS.pairs, lambda share, what: None)
+    grow(search, RIVALS.limits, RIVALS.pairs)
+    return search, logs
+
+
+@pytest.mark.parametrize("separation", [0.02, 1.99, 2.0])
+def test_what_would_tell_nothing_is_not_offered(
+    searched: tuple[Search, list[Signals]], separation: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rivals are given; the log's own would take minutes."""
+    search, (first, second) = searched
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.compete", lambda *_: search)
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.grow", lambda *_: None)
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.ambiguity_group", lambda *_: ("leak", "orifice_coefficient"))
+    nothing, time = np.zeros((2, 4)), np.array([0.0, 0.1])
+    fake = Experiment("flat", "a flat road", separation, 0.0, time, nothing[:, :2], nothing, chosen_from=10)
+    found = diagnose(search.problem.model, [first], second, replace(RIVALS, experiment=lambda *_: fake))
     notes = [note for note in found.notes if "no experiment is offered" in note]
     assert (found.experiment is not None) == (separation >= SEPARATES) == (not notes)
     assert all("of 10 road and valve profiles" in note and "by hand" in note for note in notes)

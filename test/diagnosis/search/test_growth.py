@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from helpers.driven_log import DrivenLog
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
@@ -19,30 +20,13 @@ from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 
-ROWS, PERIOD = 4000, 5e-3
+ROWS, PERIOD, NOISE = 4000, 5e-3, 0.02
 RNG = np.random.default_rng(11)
 TIME = np.arange(ROWS) * PERIOD
 FREQUENCIES = {"a": 0.9, "b": 1.7, "c": 2.6, "d": 3.8, "other": 5.2, "drive": 0.4}  # Hz
 SIGNALS = {name: np.sin(2.0 * np.pi * f * TIME + RNG.uniform(0.0, 6.0)) for name, f in FREQUENCIES.items()}
 TRUE = ("a", "b", "c", "d")
 SIGNALS["decoy"] = sum(SIGNALS[name] for name in TRUE) + 0.4 * SIGNALS["other"]  # looks better than any of them alone
-
-
-@dataclass(frozen=True)
-class Made:
-    """What the sum of the true signals looks like."""
-
-    name: str
-    measured: Array
-    period: float = PERIOD
-
-    @property
-    def weight(self) -> Array:
-        return np.ones_like(self.measured)
-
-    @property
-    def noise(self) -> Array:
-        return np.array([0.02])
 
 
 def _effects() -> dict[str, PlainEffect]:
@@ -59,13 +43,13 @@ class Sum:
     parameters: tuple[Parameter, ...] = (Parameter("gain", "1", 1.0, 0.1),)
     effects: Mapping[str, PlainEffect] = field(default_factory=_effects)
 
-    def initial(self, record: Made, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+    def initial(self, record: DrivenLog, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         return np.zeros(1), np.full(1, 1e-3)
 
     def predict(
-        self, record: Made, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
     ) -> Array:
-        out = nuisance[0] * SIGNALS["drive"] + initial[0]
+        out = nuisance[0] * record.drive + initial[0]
         for one in active:
             out = out + one.values[0] * SIGNALS.get(one.effect, SIGNALS["drive"] ** 3)
         return np.asarray(out[:rows, None])
@@ -78,10 +62,10 @@ class Sum:
         return None
 
 
-def made(sizes: Mapping[str, float]) -> Made:
-    noise = np.random.default_rng(3).normal(0.0, 0.02, ROWS)
+def made(sizes: Mapping[str, float]) -> DrivenLog:
+    noise = np.random.default_rng(3).normal(0.0, NOISE, ROWS)
     y = 1.04 * SIGNALS["drive"] + sum(size * SIGNALS[name] for name, size in sizes.items()) + noise
-    return Made("made", y[:, None])
+    return DrivenLog(y[:, None], SIGNALS["drive"], "made", PERIOD, NOISE)
 
 
 def test_a_signal_that_resembles_four_effects_makes_room_for_them() -> None:
@@ -102,9 +86,9 @@ class Sided(Sum):
     """The same, where one effect acts left, right, or on both sides; a shape of its family does something else."""
 
     def predict(
-        self, record: Made, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
     ) -> Array:
-        out = nuisance[0] * SIGNALS["drive"] + initial[0]
+        out = nuisance[0] * record.drive + initial[0]
         for one in active:
             of_sides = {"left": ("c",), "right": ("d",), "both": ("c", "d")}
             names = of_sides.get(one.site, (one.effect,)) if one.effect != "gauge.shape" else ("b",)
