@@ -190,7 +190,7 @@ def report(
 
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
-    start = start_of(report)
+    start = report.start_ns
     _show_events(report, start)
     console.print(_topics_table([topic for topic in report.topics if topic.count]))
     empty = ", ".join(topic.name for topic in report.topics if not topic.count)
@@ -206,13 +206,9 @@ def _show_report(report: Report) -> None:
     _show_settings(report, start)
 
 
-def start_of(report: Report) -> int:
-    """The first stamp of a periodic topic, ns: times are told from there."""
-    return min((topic.first_ns for topic in report.topics if topic.timing is not None), default=0)
-
-
 def _seconds(time_ns: int, start: int) -> str:
-    return f"{(time_ns - start) * 1e-9:.3f}"
+    """Since the first sample; what was noted before it was there from the start."""
+    return f"{max(time_ns - start, 0) * 1e-9:.3f}"
 
 
 def _gaps_in_words(timing: Timing) -> str:
