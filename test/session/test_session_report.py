@@ -90,6 +90,14 @@ def test_the_page(tmp_path: Path) -> None:
     assert "--bad)" in html.split("border-left")[1][:40]
 
 
+def test_a_session_that_was_cut_short_says_so_first(tmp_path: Path) -> None:
+    messages = [*contract_log(), event(T0 + 5 * 10**8, 0, "session_complete", "the session's duration has passed")]
+    log = write(tmp_path / "a.mcap", messages, metadata={"session": {"complete": "false", "reason": "node daq died"}})
+    write_report(read_log(log), tmp_path / "a.html")
+    head = (tmp_path / "a.html").read_text(encoding="utf-8").split("</header>")[0]
+    assert "not complete: node daq died" in head and "duration has passed" not in head
+
+
 def test_a_log_of_no_rig_is_refused(tmp_path: Path) -> None:
     log = read_log(write(tmp_path / "a.mcap", [m for m in contract_log(20) if m[0] != "/rig/config"]))
     with pytest.raises(InputError, match="/rig/config"):

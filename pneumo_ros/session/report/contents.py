@@ -61,7 +61,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
     return {
         "title": log.path.name,
         "facts": _facts(report),
-        "ending": _ending(report.events),
+        "ending": _ending(report),
         "trips": [_event_row(event, report) for event in report.events if event.level >= 1],
         "summary": summary_rows(ours, theirs),
         "has_passive": theirs is not None,
@@ -152,8 +152,11 @@ def _facts(report: Report) -> list[tuple[str, str]]:
     ]
 
 
-def _ending(events: Sequence[Event]) -> str:
-    last = [event for event in events if event.code.startswith("session_") and event.code != "session_started"]
+def _ending(report: Report) -> str:
+    session = next((entries for name, entries in report.metadata if name == "session"), {})
+    if session.get("complete") == "false":
+        return f"not complete: {session.get('reason') or 'the log does not say why'}"
+    last = [event for event in report.events if event.code.startswith("session_") and event.code != "session_started"]
     return f"{last[-1].code}: {last[-1].message}" if last else "the log does not say how the session ended"
 
 
