@@ -7,20 +7,39 @@ later ones do. Resolved hints with ``Optional`` mean the same to all of them.
 
 from __future__ import annotations
 
+import inspect
 import types
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import typer
+from typer.core import TyperGroup
+
+from pneumo_ros.errors import not_one_of
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+class Verbs(TyperGroup):
+    """Verbs below a verb: a wrong one is told with all there are, on one line."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The verb that runs."""
+        if not args[0].startswith("-") and args[0] not in self.commands:
+            raise not_one_of("no such verb", args[0], self.commands, where=ctx.command_path)
+        return super().resolve_command(ctx, args)
+
+
 class App(typer.Typer):
-    """Typer, with resolved annotations."""
+    """Typer, with resolved annotations and paragraphs of help that fill the terminal's lines."""
+
+    def __init__(self, *, cls: type[TyperGroup] = Verbs, **options: Any) -> None:
+        super().__init__(cls=cls, **options)
 
     def command(self, *args: Any, **options: Any) -> Callable[[Function], Function]:
         """See ``typer.Typer.command``."""
+        if options.get("help") is None:
+            return lambda function: self.command(*args, **{**options, "help": paragraphs(function)})(function)
         register = super().command(*args, **options)
         return lambda function: register(resolved(function))
 
@@ -28,6 +47,12 @@ class App(typer.Typer):
         """See ``typer.Typer.callback``."""
         register = super().callback(*args, **options)
         return lambda function: register(resolved(function))
+
+
+def paragraphs(function: Callable[..., Any]) -> str:
+    """The docstring with a line a paragraph: typer keeps the source's line ends in all but the first."""
+    text = inspect.cleandoc(function.__doc__ or "")
+    return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
 
 def resolved(function: Function) -> Function:

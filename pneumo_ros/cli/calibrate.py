@@ -30,7 +30,9 @@ def calibrate(
     calibration: Annotated[
         str, typer.Option(help="Calibration to check, or to take the other channels from: name or YAML file.")
     ] = "appendix_c",
-    output: Annotated[Path, typer.Option(help="Calibration file to write.")] = Path("calibration.yaml"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Calibration file to write.")] = Path(
+        "calibration.yaml"
+    ),
     overwrite: Overwrite = False,
     plot: Annotated[Path | None, typer.Option(help="Picture of points, lines and residuals (PNG, PDF, SVG).")] = None,
     adc_bits: Annotated[int, typer.Option(min=8, max=32, help="Width of the board's converter, bit.")] = 16,

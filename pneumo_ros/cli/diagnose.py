@@ -129,7 +129,7 @@ def diagnose(
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without))
+    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without), _bench(fit[0]))
     files, first = write_outputs(output, found, task.model, task.fit, task.holdout, asked=asked)
     if found.experiment is not None:
         files += found.experiment.write(output)
@@ -137,6 +137,16 @@ def diagnose(
         files.append(save_corrected_rig(found, task.model, save_rig))
     show(console, found, first)
     console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+
+
+def _bench(log: Path) -> tuple[str, ...]:
+    """Options of `pneumo run` that reach the bench a log is of; none for a simulated session or another recorder's."""
+    from pneumo_ros.log.inspection import final_parameters
+    from pneumo_ros.log.reading import read_log
+
+    daq = final_parameters(read_log(log)).get("daq", {})
+    given = [(f"--{key}", str(daq[key])) for key in ("port", "calibration") if daq.get(key)]
+    return ("--source", "serial", *(word for pair in given for word in pair)) if daq else ()
 
 
 def _repeated(rig: Path | None, effects: Sequence[Path] | None, without: Sequence[str] | None) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
         probability = f"{entry['probability']:.2f}" if entry else ""
         law = {"": "", DIFFERS: "another than the library's"}.get(str(entry.get("law", "")), "the library's")
         rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
-    console.print(simple_table(("of the gap", "share", "law", "probability"), rows))
+    console.print(simple_table(("of the nominal model's gap", "share", "law", "probability"), rows))
 
 
 def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:

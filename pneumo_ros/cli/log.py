@@ -39,6 +39,7 @@ _WIDE = 130  # columns from which the types are shown as well
 _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
 _COLOUR = {"ok": "green", "note": "cyan", "warning": "yellow", "error": "red"}
 FINDINGS_EXIT = 1
+_FOR_PROGRAMS = ("rosbag2",)  # metadata that nobody reads
 _NO_SIGNALS = ("/diagnostics", "/rig/events")
 _SHOWN_AS = {  # SI unit -> factor and the unit whose numbers are short
     "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m2": (1e6, "mm2"), "Pa": (1e-3, "kPa"), "rad": (1e3, "mrad"),
@@ -190,7 +191,7 @@ def report(
 
 def _show_report(report: Report) -> None:
     console.print(f"[bold]{report.path}[/]  written by {report.library}, {report.count} messages", highlight=False)
-    start = start_of(report)
+    start = report.start_ns
     _show_events(report, start)
     console.print(_topics_table([topic for topic in report.topics if topic.count]))
     empty = ", ".join(topic.name for topic in report.topics if not topic.count)
@@ -206,13 +207,9 @@ def _show_report(report: Report) -> None:
     _show_settings(report, start)
 
 
-def start_of(report: Report) -> int:
-    """The first stamp of a periodic topic, ns: times are told from there."""
-    return min((topic.first_ns for topic in report.topics if topic.timing is not None), default=0)
-
-
 def _seconds(time_ns: int, start: int) -> str:
-    return f"{(time_ns - start) * 1e-9:.3f}"
+    """Since the first sample; what was noted before it was there from the start."""
+    return f"{max(time_ns - start, 0) * 1e-9:.3f}"
 
 
 def _gaps_in_words(timing: Timing) -> str:
@@ -227,7 +224,7 @@ def _topics_table(found: Sequence[TopicReport]) -> Table:
     if wide:
         table.add_column("type", no_wrap=True)
     for name in ("count", "s", "Hz", "jitter", "missing", "delay", "clock"):
-        table.add_column(name, justify="right", no_wrap=True)
+        table.add_column(name, justify="right", no_wrap=name != "clock")
     for topic in found:
         table.add_row(topic.name, *([topic.type] if wide else []), *_topic_figures(topic))
     return table
@@ -238,11 +235,21 @@ def _topic_figures(topic: TopicReport) -> list[str]:
     if t is None:
         return [str(topic.count), *[""] * 6]
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
-    delay = f"{t.delay_p50 * 1e3:.2g}, {t.delay_p99 * 1e3:.2g}"
-    jitter = t.jitter * 1e3
-    regular = [f"{one:{form}}" if math.isfinite(one) else "" for one, form in ((t.rate_hz, ".4g"), (jitter, ".2g"))]
+    delay = ", ".join(_two_digits(1e3 * one) for one in (t.delay_p50, t.delay_p99))
+    regular = [
+        form(one) if math.isfinite(one) else "" for one, form in ((t.rate_hz, _hertz), (1e3 * t.jitter, _two_digits))
+    ]
     numbers = [f"{topic.duration:.2f}", *regular, str(t.missing), delay]
     return [str(topic.count), *numbers, ", ".join(clock) or "ok"]
+
+
+def _hertz(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _two_digits(value: float) -> str:
+    """Of a width that a column can count on: 9.6, 53, 382."""
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
 
 
 def _show_settings(report: Report, start: int) -> None:
@@ -253,7 +260,9 @@ def _show_settings(report: Report, start: int) -> None:
     for text in report.found_in_rig:
         _say("rig, as diagnosed", text)
     for name, entries in report.metadata:
-        shown = [f"{key} {_short(value)}" for key, value in entries.items() if "\n" not in value]
+        if name in _FOR_PROGRAMS:
+            continue
+        shown = [f"{key} {_short(value)}" for key, value in entries.items() if value and "\n" not in value]
         shown += [f"{key} ({len(value)} characters)" for key, value in entries.items() if "\n" in value]
         _say(name, ", ".join(shown))
     before: dict[str, dict[str, object]] = {}

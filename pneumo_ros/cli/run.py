@@ -71,7 +71,9 @@ def run(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="ROS 2 parameter file, see config/session.yaml.")] = None,
     set_: Annotated[list[str] | None, typer.Option("--set", help="node.parameter=value, repeatable.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Log to write; sessions/<time>/session.mcap by default.")] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Log to write; sessions/<time>/session.mcap by default.")
+    ] = None,
     domain: Annotated[
         int | None,
         typer.Option(

@@ -16,8 +16,6 @@ from bokeh.models import (
     CustomJS,
     HoverTool,
     InlineStyleSheet,
-    Legend,
-    LegendItem,
     Range1d,
     Select,
     TabPanel,
@@ -27,7 +25,7 @@ from bokeh.plotting import figure
 from numpy.typing import NDArray
 
 from pneumo_ros.dashboard.panels import thin
-from pneumo_ros.dashboard.shell import furnish, side_by_side, wrapping
+from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, wrapping
 from pneumo_ros.dashboard.viewer_layouts import RESIDUAL, RUNS
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import align, start_of
@@ -119,23 +117,6 @@ class Overlay:
         plot.add_tools(CrosshairTool(), HoverTool(tooltips=[("", "$name"), ("x", "$x{0.0000}"), ("y", "$y{0.0000}")]))
         return plot
 
-    def _with_legend(self, plot: Any, lines: list[tuple[str, Any]]) -> Any:
-        items = [LegendItem(label=name, renderers=[line]) for name, line in lines]
-        plot.add_layout(
-            Legend(
-                items=items,
-                click_policy="hide",
-                label_text_font_size="10px",
-                orientation="horizontal",
-                padding=2,
-                margin=0,
-                location="left",
-                border_line_alpha=0.0,
-            ),
-            "above",
-        )
-        return plot
-
     def _over_time(self, series: list[Series]) -> Any:
         ends = [(float(one.time[0]), float(one.time[-1])) for one in series]
         shared = Range1d(min(a for a, _ in ends), max(b for _, b in ends))
@@ -154,7 +135,7 @@ class Overlay:
                         ),
                     )
                 )
-            plots.append(self._with_legend(plot, lines))
+            plots.append(legend_above(plot, lines))
         return column(_chooser(plots), side_by_side(plots), sizing_mode="stretch_width")
 
     def _spectra(self) -> Any:
@@ -170,7 +151,7 @@ class Overlay:
                 values = np.nan_to_num(one.values[:, k] - np.nanmean(one.values[:, k]))
                 f, density = welch(values, rate, nperseg=min(SEGMENT, len(values)))
                 lines.append((one.name, plot.line(f[1:], density[1:], color=one.colour, name=one.name)))
-            plots.append(self._with_legend(plot, lines))
+            plots.append(legend_above(plot, lines))
         return side_by_side(plots)
 
     def _xy(self) -> Any:
@@ -192,7 +173,7 @@ class Overlay:
             choice.on_change("value", lambda attr, old, new: show())
         show()
         plot.height = 2 * HEIGHT
-        return column(wrapping(across, up), self._with_legend(plot, lines), sizing_mode="stretch_width")
+        return column(wrapping(across, up), legend_above(plot, lines), sizing_mode="stretch_width")
 
 
 def remainders(series: list[Series]) -> list[Series]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from html import escape
 from typing import Any
 
@@ -26,7 +26,7 @@ from bokeh.models import (
 from bokeh.plotting import figure
 
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
-from pneumo_ros.dashboard.shell import furnish, side_by_side, wrapping
+from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, wrapping
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
 from pneumo_ros.printable import one_line
 
@@ -34,6 +34,7 @@ REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
 WINDOW = 10.0  # s shown
 POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
+WIDGET = 290  # px; the longest name of a parameter with its unit fits above its field
 EVENTS_SHOWN = 200
 ANSWERS_SHOWN = 6
 IN_FLIGHT = 2  # pictures a slow browser may lag behind before the next is held back: its buttons must keep working
@@ -86,26 +87,23 @@ class Page:
         plot.title.text_font_size = "11px"
         lines = [(line, ColumnDataSource({"t": [], "y": []})) for line in panel.lines]
         self._plots.append((panel, plot, lines))
-        for line, data in lines:
-            plot.line("t", "y", source=data, color=line.colour, line_dash=line.dash, legend_label=line.label)
-        plot.legend.label_text_font_size = "9px"
-        plot.legend.location = "top_left"
-        plot.legend.orientation = "horizontal"
-        plot.legend.background_fill_alpha = 0.6
-        plot.legend.padding = 2
-        return plot
+        drawn = [
+            (line.label, plot.line("t", "y", source=data, color=line.colour, line_dash=line.dash))
+            for line, data in lines
+        ]
+        return legend_above(plot, drawn, "9px")
 
     def _event_table(self) -> DataTable:
         columns = [
             TableColumn(field=name, title=title, width=width)
             for name, title, width in (
-                ("time", "time (s)", 90), ("level", "level", 70), ("source", "node", 130), ("code", "code", 170),
-                ("message", "what happened", 800),
+                ("time", "time (s)", 70), ("level", "level", 65), ("source", "node", 90), ("code", "code", 140),
+                ("message", "what happened", 860),
             )
         ]  # fmt: skip
         return DataTable(
             source=self._events, columns=columns, height=180, index_position=None, name="events",
-            sizing_mode="stretch_width",
+            sizing_mode="stretch_width", autosize_mode="none",  # a telephone scrolls; it does not crush the columns
         )  # fmt: skip
 
     # -- playback --------------------------------------------------------------------------------------------------
@@ -158,14 +156,18 @@ class Page:
         self._gains.children = [wrapping(*widgets, sizing_mode="stretch_width")]
 
     def _widget(self, control: Control) -> Any:
-        unit = f" ({control.unit})" if control.unit else ""
+        unit = f" ({control.unit})" if control.unit not in ("", "1") else ""
         title, name = one_line(f"{control.node}.{control.name}{unit}"), f"set-{control.node}-{control.name}"
         if control.choices:
-            widget: Any = Select(title=title, value=str(control.value), options=list(control.choices), name=name)
+            widget: Any = Select(
+                title=title, value=str(control.value), options=list(control.choices), name=name, width=WIDGET
+            )
         elif isinstance(control.value, bool):
-            widget = Toggle(label=title, active=control.value, name=name)
+            widget = Toggle(label=title, active=control.value, name=name, width=WIDGET)
         else:
-            widget = Spinner(title=title, value=control.value, low=control.low, high=control.high, name=name, width=170)
+            widget = Spinner(
+                title=title, value=control.value, low=control.low, high=control.high, name=name, width=WIDGET
+            )
             widget.step = max(abs(float(control.value)) / 20.0, 1e-6)
         widget.on_change("active" if isinstance(widget, Toggle) else "value", self._changer(control))
         return widget
@@ -237,7 +239,7 @@ class Page:
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
             "source": [one_line(e.source) for e in newest],
             "code": [one_line(e.code) for e in newest],
-            "message": [one_line(e.message + "".join(f", {k} {v}" for k, v in e.values.items())) for e in newest],
+            "message": [one_line(e.message + _values(e.values)) for e in newest],
         }
 
     def _show_answers(self) -> None:
@@ -246,6 +248,11 @@ class Page:
         if new:
             self._said = [*self._said, *new][-ANSWERS_SHOWN:]
             self._answers.text = "<br>".join(_shown(line) for line in self._said)
+
+
+def _values(values: Mapping[str, str]) -> str:
+    """What an event carries besides its text; the start of its clock is nothing to read."""
+    return "".join(f", {key} {value}" for key, value in values.items() if key != "start_ns")
 
 
 def _shown(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from bokeh.core.templates import get_env
 from bokeh.document import Document
 from bokeh.layouts import row
-from bokeh.models import InlineStyleSheet
+from bokeh.models import InlineStyleSheet, Legend, LegendItem
 
 from pneumo_ros.printable import one_line
 
@@ -36,6 +36,15 @@ def side_by_side(plots: Sequence[Any]) -> Any:
     for plot in plots:
         plot.stylesheets = [*plot.stylesheets, InlineStyleSheet(css=_HALF)]  # a model belongs to one document
     return wrapping(*plots, sizing_mode="stretch_width")
+
+
+def legend_above(plot: Any, lines: Sequence[tuple[str, Any]], size: str = "10px") -> Any:
+    """The plot with its legend between title and curves, where it covers none of them; a click hides a curve."""
+    items = [LegendItem(label=name, renderers=[line]) for name, line in lines]
+    legend = Legend(items=items, click_policy="hide", label_text_font_size=size, orientation="horizontal", padding=2,
+                    margin=0, location="left", border_line_alpha=0.0)  # fmt: skip
+    plot.add_layout(legend, "above")
+    return plot
 
 
 def wrapping(*widgets: Any, **options: Any) -> Any:

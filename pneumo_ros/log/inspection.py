@@ -21,6 +21,8 @@ GAP_FACTOR = 1.5  # a pause longer than this many periods is a gap: half way to 
 JUMP = 0.1  # s; delays that change by more from one message to the next mean that a clock was set
 _PERIODIC = 10  # fewer messages say nothing about a rate
 DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
+_IRREGULAR = (DIAGNOSTIC_ARRAY, PARAMETER_EVENT)
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,11 @@ class Report:
         return sum(t.count for t in self.topics)
 
     @property
+    def start_ns(self) -> int:
+        """The first stamp of any periodic topic, ns: every time that people read is told from there."""
+        return min((t.first_ns for t in self.topics if t.timing is not None), default=0)
+
+    @property
     def duration(self) -> float:
         """From the first stamp of any periodic topic to the last, s."""
         timed = [t for t in self.topics if t.timing is not None]
@@ -174,8 +181,8 @@ def inspect_topic(log: Log, name: str) -> TopicReport:
         stamps, logged = log.stamps(name)
     else:
         stamps = logged = log.records(name).log_time_ns
-    # Events and health come from several nodes at once, openings when they change: their stamps say nothing of a rate.
-    periodic = len(stamps) >= _PERIODIC and info.type != DIAGNOSTIC_ARRAY and name != topics.APPLIED.name
+    # Events, health and parameters come from several nodes at once, openings when they change: no stamps of a rate.
+    periodic = len(stamps) >= _PERIODIC and info.type not in _IRREGULAR and name != topics.APPLIED.name
     timing = measure_timing(stamps, logged, log.records(name).disordered) if periodic else None
     first, last = (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
     return TopicReport(name, info.type, info.count, first, last, info.qos, timing)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 
@@ -33,13 +34,19 @@ def warnings_of(log: Log, loop: Mapping[str, Mapping[str, str]], mode: str) -> t
     events = list(read_events(log))
     late = sum(event.code == STALE for event in events)
     if late:
-        found.append(f"{late} times no estimate came in time; the controller then sent the safe command")
+        often = "once" if late == 1 else f"{late} times"
+        found.append(f"{often} no estimate came in time; the controller then sent the safe command")
     for (node, key), meaning in REFUSED.items():
         count = int(float(loop.get(node, {}).get(key, "0")))
         if count:
-            found.append(f"{count} {meaning}")
+            found.append(f"{count} {meaning}" if count > 1 else f"1 {_one(meaning)}")
     trips = Counter(event.message for event in events if event.level >= TRIPPED)
     return (*found, *(f"error: {text}" + (f" ({n} times)" if n > 1 else "") for text, n in trips.items()))
+
+
+def _one(meaning: str) -> str:
+    """The same of a single command or sample."""
+    return re.sub(r"^(command|sample)s were", r"\1 was", meaning)
 
 
 def _missed(loop: Mapping[str, Mapping[str, str]]) -> list[str]:

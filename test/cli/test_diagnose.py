@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from helpers.folders import DOCS
 from helpers.rig_logs import noisy, simulated, write_log
-from helpers.small_logs import contract_log, write
+from helpers.small_logs import STRING, T0, contract_log, text, write
 from typer.testing import CliRunner
 
-from pneumo_ros.cli.diagnose import app
+from pneumo_ros.cli.diagnose import _bench, app
 from pneumo_ros.diagnosis.half_car.from_logs import prepared
 from pneumo_ros.diagnosis.signals import read_signals
 from pneumo_ros.effects.loading import load_library
@@ -36,6 +36,13 @@ def own_effect(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("own") / "quadratic.py"
     path.write_text(code.group(1), encoding="utf-8")
     return path
+
+
+def test_what_comes_next_runs_on_the_bench_that_the_log_is_of(tmp_path: Path) -> None:
+    daq = "node: daq\nparameters: {port: /dev/ttyACM0, calibration: mine.yaml, baud: 921600}\n"
+    bench = write(tmp_path / "bench.mcap", [*contract_log(20), ("/rig/setup", STRING, T0, text(daq))])
+    assert _bench(bench) == ("--source", "serial", "--port", "/dev/ttyACM0", "--calibration", "mine.yaml")
+    assert _bench(write(tmp_path / "simulated.mcap", contract_log(20))) == ()
 
 
 def damped_log(path: Path, seed: int, own_effect: Path, payload: float = 0.0) -> Path:

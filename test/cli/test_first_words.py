@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -55,6 +56,11 @@ def test_the_list_of_verbs_needs_nothing(tmp_path: Path) -> None:
         (["emulate", "--road", "bmp"], ["did you mean 'bump'?"]),
         (["emulate", "--fault", "stuk@1"], ["did you mean 'stuck'?", "converter"]),
         (["emulate", "--fault", "stuck@-1"], ["before the first arming", "stuck@-1"]),
+        (
+            ["log", "inf"],
+            ["no such verb", "did you mean 'info'?", "validate", "recover", "export", "compare", "report"],
+        ),
+        (["run", "--controller", "smfcl", "-o", "x.mcap"], ["did you mean 'smflc'?"]),
         (["thesis", "9"], ["no such chapter", "beyond"]),
         (["blind", "score", "nowhere"], ["nowhere"]),
         (["calibrate", "nowhere.csv"], ["nowhere.csv"]),
@@ -71,6 +77,15 @@ def test_a_mistake_is_told_at_once(tmp_path: Path, words: list[str], told: list[
     assert code == 2 and not loaded & set(HEAVY), loaded
     assert said.count("\n") == 1 and all(word in said for word in told), said
     assert not (tmp_path / "out").exists()
+
+
+def test_help_fills_the_lines_of_the_terminal(tmp_path: Path) -> None:
+    """A paragraph of help breaks where the terminal ends, not where the source did."""
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "diagnose", "--help"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "COLUMNS": "80"})
+    lines = [line.strip() for line in done.stdout.partition("About 20 s")[2].partition("╭")[0].splitlines()]
+    told = [line for line in lines if line]
+    assert len(told) >= 4 and all(50 < len(line) <= 80 for line in told[:-1]), told
 
 
 def test_what_refuses_to_overwrite_knows_what_is_written() -> None:

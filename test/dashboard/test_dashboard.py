@@ -24,12 +24,16 @@ from helpers.browser import browser
 from helpers.small_logs import contract_log, write
 
 pytest.importorskip("bokeh")
+from bokeh.document import Document
+from bokeh.models import Legend
+from bokeh.plotting import figure
 from bokeh.util.token import generate_jwt_token, generate_session_id
 from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from pneumo_ros.dashboard.guard import MAX_VIEWERS, is_loopback
-from pneumo_ros.dashboard.panels import MOTION, TYRES, Samples, derive, thin
+from pneumo_ros.dashboard.page import Page
+from pneumo_ros.dashboard.panels import MOTION, PANELS, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
 from pneumo_ros.dashboard.source import Playback
 from pneumo_ros.log import topics
@@ -39,6 +43,23 @@ from pneumo_ros.plant.air_spring import MEAN_AREA, VOLUME_OFFSET
 from pneumo_ros.rig import load_rig
 
 URL = re.compile(r"http://\S+")
+
+
+# Names of parameters that are wider than their field.
+LABELS = """
+const wide = [];
+function walk(root) {
+  for (const e of root.querySelectorAll('*')) {
+    if (e.tagName === 'LABEL' && e.offsetWidth) {
+      const text = document.createRange(); text.selectNodeContents(e);
+      const field = e.getRootNode().host.getBoundingClientRect().width;
+      if (text.getBoundingClientRect().width > field) wide.push(e.textContent);
+    }
+    if (e.shadowRoot) walk(e.shadowRoot);
+  }
+}
+walk(document); return wide;
+"""
 
 
 @contextmanager
@@ -118,6 +139,17 @@ def test_playback_moves_steps_seeks_and_loops(log_path: Path) -> None:
     assert shown() == 0.0 and play.status().state == "playing"
     play.seek(-5.0)
     assert shown() == 0.0
+
+
+def test_no_legend_covers_a_curve(log_path: Path) -> None:
+    document = Document()
+    Page(document, Playback(read_log(log_path)))
+    plots = list(document.select({"type": figure}))
+    assert len(plots) == len(PANELS)
+    for plot in plots:
+        assert [one for one in plot.above if isinstance(one, Legend)] == plot.legend[:], plot.title.text
+    shown = next(iter(document.select({"name": "events"}))).source.data["message"]
+    assert not any("start_ns" in text for text in shown)
 
 
 def fetch(url: str, **headers: str) -> int:
@@ -256,6 +288,7 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         assert tab.model("gains", "visible") is False  # the pictures come first
         tab.click("Parameters")
         tab.wait(lambda: tab.model("gains", "visible"), "the parameters to unfold")
+        assert tab.driver.execute_script(LABELS) == [], "names that run into their neighbours"
         tab.driver.execute_script("Bokeh.documents[0].get_model_by_name('set-controller-pole').value = 12.5")
         tab.wait(lambda: "controller.pole = 12.5: set" in tab.model("answers", "text"), "the gain to change")
         os.kill(sessions.children(process.pid)["single_process"], signal.SIGINT)

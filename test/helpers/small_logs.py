@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +47,9 @@ def text(value: str) -> object:
     return STORE.types[STRING](value)
 
 
-def write(path: Path, messages: Sequence[Message], **options: object) -> Path:
+def write(
+    path: Path, messages: Sequence[Message], metadata: Mapping[str, dict[str, str]] | None = None, **options: object
+) -> Path:
     """A log as any MCAP writer makes it."""
     with path.open("wb") as stream:
         writer = Writer(stream, **options)  # type: ignore[arg-type]
@@ -60,6 +62,8 @@ def write(path: Path, messages: Sequence[Message], **options: object) -> Path:
                 channels[topic] = writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": "[]"})
             data = bytes(STORE.serialize_cdr(message, kind))
             writer.add_message(channels[topic], time, data, time, i)
+        for name, entries in (metadata or {}).items():
+            writer.add_metadata(name, entries)
         writer.finish()
     return path
 

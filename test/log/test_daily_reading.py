@@ -51,6 +51,19 @@ def test_info_fits_the_terminal_and_tells_events_first(tmp_path: Path, width: in
     assert "/rig/displacement" in text and "500" in text
 
 
+def test_info_of_a_slow_line_fits_the_terminal_too(tmp_path: Path) -> None:
+    """Messages that took from a hundredth to four tenths of a second: no column is cut."""
+    late = [10**7 + 37 * 10**7 * (i // 40 % 2) for i in range(10_000)]
+    messages = [
+        (topic, kind, time + late[i], message) for i, (topic, kind, time, message) in enumerate(contract_log(300))
+    ]
+    metadata = {"session": {"complete": "true", "reason": ""}, "rosbag2": {"serialized_metadata": "a\nb"}}
+    text = said("info", write(tmp_path / "run.mcap", sorted(messages, key=lambda one: one[2]), metadata))
+    assert "…" not in text and max(map(len, text.splitlines())) <= 80
+    assert ", 381" in text and "e+02" not in text and "serialized_metadata" not in text
+    assert "session: complete true\n" in text
+
+
 def test_logs_are_laid_over_each_other_by_their_road(logs: tuple[Path, Path, Path]) -> None:
     first, second, third = map(read_log, logs)
     assert align(first, second) == ("same", pytest.approx(1.0, abs=2e-3))

@@ -142,6 +142,8 @@ def test_warnings_count_what_went_wrong(tmp_path: Path) -> None:
     loop = {"plant": {"steps": "990", "missed periods": "10"}, "daq": {"refused commands": "7"}}
     told = warnings_of(log, loop, "realtime")
     assert told[0].startswith("plant missed 10 of 1000 periods (1.0%)")
-    assert told[1].startswith("1 times no estimate") and told[2].startswith("7 commands were refused by the driver")
+    assert told[1].startswith("once no estimate") and told[2].startswith("7 commands were refused by the driver")
     assert told[3] == "error: no fresh command"
+    one = warnings_of(log, {"daq": {"commands the board refused": "1"}}, "realtime")
+    assert "1 command was refused by the board" in one
     assert not any("missed" in line for line in warnings_of(log, loop, "lockstep"))

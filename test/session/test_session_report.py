@@ -27,6 +27,12 @@ def event(time_ns: int, level: int, code: str, message: str) -> Message:
     return ("/rig/events", "diagnostic_msgs/msg/DiagnosticArray", time_ns, array)
 
 
+def parameter_event(time_ns: int) -> Message:
+    kind = "rcl_interfaces/msg/ParameterEvent"
+    time = STORE.types["builtin_interfaces/msg/Time"](0, time_ns)
+    return ("/parameter_events", kind, time_ns, STORE.types[kind](time, "/controller", [], [], []))
+
+
 class Balanced(HTMLParser):
     """Fails on tags that do not close, and collects what the page refers to."""
 
@@ -52,6 +58,7 @@ def test_the_page(tmp_path: Path) -> None:
         ("/rig/setup", STRING, T0, text("node: controller\nparameters: {pole: 10.0}\n")),
         ("/rig/setup", STRING, T0 + 10**8, text("node: controller\nparameters: {pole: 20.0}\n")),
         ("/rig/calibration", STRING, T0, text("sprung_front: {slope: -0.0270281}\n")),
+        *[parameter_event(1000)] * 20,  # all of one instant, long before the first sample
         event(T0 + 2 * 10**8, 2, "trip_pressure", "<b>too high</b>"),
         event(T0 + 5 * 10**8, 0, "session_complete", "the session's duration has passed"),
     ]
@@ -76,7 +83,19 @@ def test_the_page(tmp_path: Path) -> None:
         "-0.0270281",
     ):
         assert words in html, words
+    rows = [re.sub(r"<[^>]+>", " ", row).split() for row in html.split("<tr>")]
+    assert ["0.100", "controller", "changed", "pole", "20.0"] in [row[:5] for row in rows], "since the first sample"
+    assert any(row[:2] == ["0.200", "error"] for row in rows)
+    assert not re.search(r">\s*nan\s*<", html)
     assert "--bad)" in html.split("border-left")[1][:40]
+
+
+def test_a_session_that_was_cut_short_says_so_first(tmp_path: Path) -> None:
+    messages = [*contract_log(), event(T0 + 5 * 10**8, 0, "session_complete", "the session's duration has passed")]
+    log = write(tmp_path / "a.mcap", messages, metadata={"session": {"complete": "false", "reason": "node daq died"}})
+    write_report(read_log(log), tmp_path / "a.html")
+    head = (tmp_path / "a.html").read_text(encoding="utf-8").split("</header>")[0]
+    assert "not complete: node daq died" in head and "duration has passed" not in head
 
 
 def test_a_log_of_no_rig_is_refused(tmp_path: Path) -> None:

@@ -226,7 +226,7 @@ def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str
         "side": _sides(entry),
         "words": " and ".join(phrases.get(effect, "") for effect in entry["effects"]),
         "probability": float(entry["probability"]),
-        "gap": float("inf") if lost else float(entry["gap_after"]),
+        "gap": "" if lost else f"{float(entry['gap_after']):.3g}",
         "shrink": "ran away" if lost else percent(entry["shrink"]),
         "bar": shrink_bar(float(entry["shrink"] or 0.0), (low, high)),
     }

@@ -14,13 +14,13 @@ from pneumo_ros.diagnosis.result import ROAD_FILE, VALVE_FILE
 
 # For a place without a name: (what moves it, the road that does) [display]
 _TELLING: Final = {
-    "air": ("sweeps the valves' whole range on a smooth road", "--road flat --controller third_order_smc"),
-    "supply": ("draws air from both ends at once", "--road E"),
-    "force": ("moves the springs slowly and fast, by little and by much", "--road sweep"),
-    "tyre": ("goes through the wheels' hop", "--road sweep"),
-    "sensor": ("takes each sensor through its range slowly", "--road sine"),
-    "body": ("shakes heave and pitch", "--road bump"),
-    "road": ("is another road than the one that was fitted", "--road E"),
+    "air": ("that sweeps the valves' whole range on a smooth road", "--road flat --controller third_order_smc"),
+    "supply": ("that draws air from both ends at once", "--road E"),
+    "force": ("that moves the springs slowly and fast, by little and by much", "--road sweep"),
+    "tyre": ("that goes through the wheels' hop", "--road sweep"),
+    "sensor": ("that takes each sensor through its range slowly", "--road sine"),
+    "body": ("that shakes heave and pitch", "--road bump"),
+    "road": ("on another road than the one that was fitted", "--road E"),
 }
 
 
@@ -34,6 +34,7 @@ class Asked:
     output : the diagnosis' folder, as typed
     rig : the file of --save-rig; None where none was wanted
     options : of the diagnosis, to be repeated
+    rig_options : of ``pneumo run`` for the rig that the logs are of; none for the simulated one
     """
 
     fit: tuple[Path, ...] = (Path("FIT.mcap"),)
@@ -41,12 +42,17 @@ class Asked:
     output: Path = Path("DIAGNOSIS")
     rig: Path | None = None
     options: tuple[str, ...] = ()
+    rig_options: tuple[str, ...] = ()
 
     def diagnosis(self, *further: Path, output: Path, options: tuple[str, ...] = ()) -> str:
         """``pneumo diagnose`` of the same logs and further ones."""
         held = () if self.holdout is None else ("--holdout", self.holdout)
         words = ("pneumo", "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
         return command(*words)
+
+    def session(self, *options: object, output: Path) -> str:
+        """``pneumo run`` on the rig that the logs are of."""
+        return command("pneumo", "run", *self.rig_options, *options, "--output", output)
 
 
 @dataclass(frozen=True)
@@ -107,10 +113,10 @@ def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
     played = _second(asked)
     files = {key: asked.output / name for key, name in (("--road", ROAD_FILE), ("--valves", VALVE_FILE))}
     length = str(experiment.get("command", "")).rpartition("--duration ")[2].split(" ")[0] or "12"
-    run = command("pneumo", "run", *(word for pair in files.items() for word in pair), "--duration", length,
-                  "--output", played)  # fmt: skip
-    text = f"{str(experiment['description']).rstrip('.')} (on hardware with --source serial --port PORT)"
-    return Step(f"Split the rivals: {text}.", (run, asked.diagnosis(played, output=_another(asked.output))))
+    run = asked.session(*(word for pair in files.items() for word in pair), "--duration", length, output=played)
+    text = str(experiment["description"]).rstrip(".")
+    elsewhere = "" if asked.rig_options else " (on hardware with --source serial --port PORT)"
+    return Step(f"Split the rivals: {text}{elsewhere}.", (run, asked.diagnosis(played, output=_another(asked.output))))
 
 
 def _second(asked: Asked) -> Path:
@@ -123,7 +129,7 @@ def _another(folder: Path) -> Path:
 
 def _more(asked: Asked, text: str, options: str) -> Step:
     played = _second(asked)
-    run = f"pneumo run {options} --duration 20 --output {shlex.quote(str(played))}"
+    run = asked.session(*options.split(), "--duration", "20", output=played)
     return Step(text, (run, asked.diagnosis(played, output=_another(asked.output))))
 
 
@@ -133,7 +139,7 @@ def _look_closer(summary: Mapping[str, Any], asked: Asked) -> Step:
     kind = next((kind for kind in _TELLING for place in places[:1] if kind in place), "road")
     moves, options = _TELLING[kind]
     where = place_words(places[0]) if places else "the rig"
-    return _more(asked, f"Log a session that {moves}: it shows more of the law at {where}.", options)
+    return _more(asked, f"Log a session {moves}: it shows more of the law at {where}.", options)
 
 
 def _idea(summary: Mapping[str, Any], asked: Asked) -> Step:
@@ -157,5 +163,5 @@ def _keep(summary: Mapping[str, Any], asked: Asked) -> Step:
 def _record_again(summary: Mapping[str, Any], asked: Asked) -> Step:
     if forbidden(summary):
         return Step("Mend what is listed as a note, and record the session again.")
-    run = f"pneumo run --road E --duration 20 --output {shlex.quote(str(_second(asked)))}"
+    run = asked.session("--road", "E", "--duration", "20", output=_second(asked))
     return Step("Record a session that moves more: a rougher road with the valves at work, 15 s or longer.", (run,))

@@ -236,7 +236,7 @@ def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, E
 def _value(parameters: Mapping[str, Any], effect: str, name: str) -> float | None:
     """Of a parameter, whose key carries its effect's id where two effects share the name."""
     found = parameters.get(name) or next((v for k, v in parameters.items() if effect in k and k.endswith(name)), None)
-    return None if found is None else float(found["value"])
+    return None if found is None or found["value"] is None else float(found["value"])
 
 
 def _rivals(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
@@ -370,7 +370,7 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
     if tried:
         order = [str(t["candidate"]) for t in summary["tried"]]
         number = order.index(str(tried[0]["candidate"])) + 1
-        return (
-            f"{name} was fitted and is number {number} of {len(order)}: {float(tried[0]['gap_fit'] or np.inf):.3g} left"
-        )
+        left = tried[0]["gap_fit"]
+        words = "it ran away" if left is None else f"{float(left):.3g} left"
+        return f"{name} was fitted and is number {number} of {len(order)}: {words}"
     return f"{name} scored too low in the screening to be fitted"

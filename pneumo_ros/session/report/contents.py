@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import base64
+import math
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -60,7 +61,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
     return {
         "title": log.path.name,
         "facts": _facts(report),
-        "ending": _ending(report.events),
+        "ending": _ending(report),
         "trips": [_event_row(event, report) for event in report.events if event.level >= 1],
         "summary": summary_rows(ours, theirs),
         "has_passive": theirs is not None,
@@ -72,8 +73,8 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "loop": loop_rows(ours),
         "topics": [topic_row(topic) for topic in report.topics],
         "events": [_event_row(event, report) for event in report.events],
-        "calibrations": [(f"{time_ns / 1e9:.3f}", text) for time_ns, text in report.calibrations],
-        "setups": list(setup_rows(report.setups)),
+        "calibrations": [(_since_start(time_ns, report), text) for time_ns, text in report.calibrations],
+        "setups": list(setup_rows(report.setups, report.start_ns)),
         "rig": [(name, f"{nominal:g}", f"{value:g}") for name, (nominal, value) in report.changed_parameters.items()]
         + [("as diagnosed", "", text) for text in report.found_in_rig],
         "rig_name": report.rig or "not in the log",
@@ -120,12 +121,15 @@ def topic_row(topic: TopicReport) -> Row:
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
     missing = f"{t.missing} in {len(t.gaps)} gaps, longest {t.gaps[0].length:.4g} s" if t.gaps else "0"
     delay = f"{t.delay_p50 * 1e3:.3g} / {t.delay_p99 * 1e3:.3g}"
-    figures = (f"{topic.duration:.3f}", f"{t.rate_hz:.6g}", f"{t.jitter * 1e3:.3g}", missing, delay)
+    regular = [
+        f"{one:.{digits}g}" if math.isfinite(one) else "" for one, digits in ((t.rate_hz, 6), (1e3 * t.jitter, 3))
+    ]
+    figures = (f"{topic.duration:.3f}", *regular, missing, delay)
     return (topic.name, topic.type, str(topic.count), *figures, ", ".join(clock) or "steady")
 
 
-def setup_rows(setups: Sequence[Setup]) -> Iterator[Row]:
-    """(time s, node, what, parameters): all at the start, later only what changed."""
+def setup_rows(setups: Sequence[Setup], start_ns: int) -> Iterator[Row]:
+    """(time s since the first sample, node, what, parameters): all at the start, later only what changed."""
     before: dict[str, dict[str, object]] = {}
     for setup in setups:
         known = before.setdefault(setup.node, {})
@@ -133,7 +137,7 @@ def setup_rows(setups: Sequence[Setup]) -> Iterator[Row]:
         word = "changed" if known.keys() & new.keys() else "start"
         known.update(new)
         shown = ", ".join(f"{key} {_short(str(value))}" for key, value in new.items() if value != "")
-        yield (f"{setup.time_ns / 1e9:.3f}", setup.node, word, shown)
+        yield (_seconds(setup.time_ns - start_ns), setup.node, word, shown)
 
 
 def _facts(report: Report) -> list[tuple[str, str]]:
@@ -148,16 +152,27 @@ def _facts(report: Report) -> list[tuple[str, str]]:
     ]
 
 
-def _ending(events: Sequence[Event]) -> str:
-    last = [event for event in events if event.code.startswith("session_") and event.code != "session_started"]
+def _ending(report: Report) -> str:
+    session = next((entries for name, entries in report.metadata if name == "session"), {})
+    if session.get("complete") == "false":
+        return f"not complete: {session.get('reason') or 'the log does not say why'}"
+    last = [event for event in report.events if event.code.startswith("session_") and event.code != "session_started"]
     return f"{last[-1].code}: {last[-1].message}" if last else "the log does not say how the session ended"
 
 
 def _event_row(event: Event, report: Report) -> Row:
-    start = min((t.first_ns for t in report.topics if t.timing is not None), default=0)
     values = ", ".join(f"{key} {value}" for key, value in event.values.items())
     level = LEVELS.get(event.level, str(event.level))
-    return (f"{max(event.time_ns - start, 0) * 1e-9:.3f}", level, event.source, event.code, event.message, values)
+    return (_since_start(event.time_ns, report), level, event.source, event.code, event.message, values)
+
+
+def _since_start(time_ns: int, report: Report) -> str:
+    return _seconds(time_ns - report.start_ns)
+
+
+def _seconds(since_ns: int) -> str:
+    """What was noted before the first sample was there from the start."""
+    return f"{max(since_ns, 0) * 1e-9:.3f}"
 
 
 def _tone(findings: Sequence[Finding], events: Sequence[Event]) -> str:

@@ -14,8 +14,20 @@ from typer.testing import CliRunner
 from pneumo_ros.cli.main import app
 from pneumo_ros.diagnosis.diagnose import Options
 from pneumo_ros.diagnosis.half_car.from_logs import diagnose_files, prepared
+from pneumo_ros.diagnosis.judge.held_out import noise_floor, total_floor
 from pneumo_ros.diagnosis.judge.held_out_runs import held_out
 from pneumo_ros.rig import load_rig
+
+NOT_BELOW = 0.98  # of the noise alone: what the noise of 7500 samples is itself known to
+
+
+def test_no_gap_of_a_known_rig_lies_below_the_noise_alone(practice: Callable[[str], Path]) -> None:
+    """The rig that made the log: channel by channel nothing but noise is left, and a floor above it is an error."""
+    task = prepared([practice("nominal-exact-fit")], practice("nominal-exact-holdout"))
+    nominal = np.array([p.nominal for p in task.model.parameters])
+    left = held_out(task.model, task.holdout, nominal, ())
+    assert np.all(left.channels > NOT_BELOW * noise_floor(task.holdout))
+    assert left.total > NOT_BELOW * total_floor(task.holdout)
 
 
 @pytest.mark.slow
@@ -26,6 +38,7 @@ def test_lag_of_the_rear_valve_is_named_and_its_gap_closed(practice: Callable[[s
     best = found.ranking[0]
     assert found.verdict == "valve_lag" and best.side == "rear" and found.location[0][0] == "rear_air"
     assert best.shrink > 0.9 and found.gap.best < 2.5 * found.gap.noise_floor
+    assert found.gap.best > NOT_BELOW * found.gap.noise_floor
     # labels.json: natural frequency 67.0 rad/s, damping ratio 0.86
     assert best.parameters["valve_lag"].value == pytest.approx(1.0 / 66.997, rel=0.03)
     assert best.parameters["valve_damping_ratio"].value == pytest.approx(0.862, rel=0.05)
@@ -44,6 +57,7 @@ def test_the_command_line_writes_all_files_and_finds_no_effect_where_there_is_no
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "diagnosis.json").read_text())
     assert found["verdict"] == "none" and found["probability"] > 0.8 and found["ambiguity_group"] == []
+    assert found["gap"]["best"] > NOT_BELOW * found["gap"]["noise_floor"]
     assert found["gap"]["best"] == found["gap"]["refit"] < 0.02 < 0.5 < found["gap"]["nominal"]
     assert sum(entry["probability"] for entry in found["ranking"]) == pytest.approx(1.0, abs=1e-3)
     assert {"report.html", "residual.mcap"} <= {path.name for path in tmp_path.iterdir()}

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.browser import browser
 from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.diagnosis.report import Findings, render, write_outputs, write_report, write_residual_log
@@ -167,7 +168,10 @@ def test_every_verdict_says_what_to_do_next() -> None:
     page = render(replace(found, asked=asked))
     assert escape(second.text) in re.sub("</?span[^>]*>", "", page) and diagnosed in unescape(page)
     assert '<span class="option">--rig</span>' in page  # not broken over two lines
+    bench = Asked((Path("a.mcap"),), rig_options=("--source", "serial", "--port", "/dev/ttyACM0"))
+    assert next_steps(found.summary, bench)[0].commands[0].startswith("pneumo run --source serial --port /dev/ttyACM0 ")
     clear = {**found.summary, "next_experiment": None}
+    assert "--source serial" in next_steps({**clear, "verdict": "unknown"}, bench)[0].commands[0]
     assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 2, 1]
     closer, idea = next_steps({**clear, "verdict": "unknown"}, asked)
     assert "the front air and valve" in closer.text and "--effect MY_EFFECT.py" in idea.commands[0]
@@ -408,13 +412,33 @@ def test_what_is_not_finite_is_told_too() -> None:
             "shrink": None, "shrink_ci90": [None, None], "parameters": {}}  # fmt: skip
     found = findings("unknown")
     summary = {**found.summary, "ranking": [*found.summary["ranking"], lost], "evidence": {},
-               "tried": [{"candidate": "mine:rear", "gap_fit": None}]}  # fmt: skip
+               "tried": [{"candidate": "leak:front", "gap_fit": 0.1},
+                         {"candidate": "mine:rear", "gap_fit": None}]}  # fmt: skip
     assert ">ran away<" in render(replace(found, summary=summary))
     facts = dict(story(summary, Known(LIBRARY, own=("mine", "valve_lag"))).facts)
-    assert facts["closest"].startswith("leak") and "inf left" in facts["your effect"]
+    assert facts["closest"].startswith("leak") and "2 of 2: it ran away" in facts["your effect"]
+    assert not re.search(r">\s*(inf|nan)\s*<", render(replace(found, summary=summary)))
     loose = {
         **findings().summary["ranking"][0],
         "parameters": {"leak_area": {"value": 4e-7, "std": None, "unit": "m2"}},
     }
     said = story({**findings().summary, "ranking": [loose]}, Known(LIBRARY))
     assert dict(said.facts)["how big"].startswith("no single number")
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_every_row_of_a_table_stands_under_its_heads(tmp_path: Path, width: int) -> None:
+    """In a real browser, at the width of a telephone and of a desk; and nothing sticks out of the page."""
+    write_report(tmp_path / "report.html", findings())
+    with browser() as tab:
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 720}
+        tab.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        tab.driver.get((tmp_path / "report.html").as_uri())
+        assert tab.driver.execute_script("return document.documentElement.scrollWidth") <= width
+        rows = tab.driver.execute_script(
+            "const shown = row => [...row.cells].filter(cell => cell.offsetWidth);"
+            "return [...document.querySelectorAll('tr')].map(row => shown(row).map(cell => cell.offsetTop))"
+        )
+    assert len(rows) > 5
+    for tops in rows:
+        assert len(set(tops)) <= 1, "the cells of a row stand side by side"
