@@ -53,7 +53,7 @@ class Page:
         self._range = Range1d(0.0, WINDOW)
         self._status = Div(text="", name="status", sizing_mode="stretch_width")
         self._events = ColumnDataSource({"time": [], "level": [], "source": [], "code": [], "message": []})
-        self._event_count = -1
+        self._shown_events = (-1, 0)
         self._last = time.monotonic()
         self._said: list[str] = []
         self._answers = Div(text="", name="answers")
@@ -230,12 +230,13 @@ class Page:
 
     def _refresh_events(self, start_ns: int) -> None:
         events = self._source.events()
-        if len(events) == self._event_count:
+        if (len(events), start_ns) == self._shown_events:
             return
-        self._event_count = len(events)
+        # An event may be heard before the first sample, whose stamp its time is told from.
+        self._shown_events = (len(events), start_ns)
         newest = list(events)[: -EVENTS_SHOWN - 1 : -1]
         self._events.data = {
-            "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" for e in newest],
+            "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" if start_ns else "" for e in newest],
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
             "source": [one_line(e.source) for e in newest],
             "code": [one_line(e.code) for e in newest],

@@ -14,6 +14,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import IO
 
@@ -35,7 +36,7 @@ from pneumo_ros.dashboard.guard import MAX_VIEWERS, is_loopback
 from pneumo_ros.dashboard.page import Page
 from pneumo_ros.dashboard.panels import MOTION, PANELS, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
-from pneumo_ros.dashboard.source import Playback
+from pneumo_ros.dashboard.source import Playback, Status
 from pneumo_ros.log import topics
 from pneumo_ros.log.inspection import read_events
 from pneumo_ros.log.reading import read_log
@@ -150,6 +151,26 @@ def test_no_legend_covers_a_curve(log_path: Path) -> None:
         assert [one for one in plot.above if isinstance(one, Legend)] == plot.legend[:], plot.title.text
     shown = next(iter(document.select({"name": "events"}))).source.data["message"]
     assert not any("start_ns" in text for text in shown)
+
+
+class Unheard(Playback):
+    """A session whose events are known before its first sample, as a viewer that joins may have it."""
+
+    heard = False
+
+    def status(self) -> Status:
+        known = super().status()
+        return known if self.heard else replace(known, now_ns=0, start_ns=0)
+
+
+def test_times_of_events_count_from_the_first_sample_as_soon_as_it_is_known(log_path: Path) -> None:
+    document, source = Document(), Unheard(read_log(log_path))
+    page = Page(document, source)
+    table = next(iter(document.select({"name": "events"}))).source
+    assert len(table.data["time"]) > 0 and not any(table.data["time"])
+    source.heard = True
+    page.refresh()
+    assert all(0.0 <= float(text) < 60.0 for text in table.data["time"])
 
 
 def fetch(url: str, **headers: str) -> int:
