@@ -31,10 +31,9 @@ def effects(
 
     from pneumo_ros.effects.loading import laws_of, load_library
     from pneumo_ros.errors import not_one_of
-
-    library, console = laws_of(load_library(file or ())), Console(highlight=False)
     from pneumo_ros.slots.guides import GUIDES
 
+    library, console = laws_of(load_library(file or ())), Console(highlight=False)
     if effect is None:
         _list(console, library)
     elif effect in library:
