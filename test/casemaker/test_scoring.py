@@ -148,6 +148,8 @@ def test_page_holds_scores_baselines_and_failures(tmp_path: Path) -> None:
     both = page.read_text()
     assert both.index("Set `later`") < both.index("Set `t`")
     assert both.count("# The blind check") == 1
+    write_report(page, LABELS, FOUND, {"set": "later", "seed": 3, "software": "pneumo_ros 9.9"})
+    assert len(list(tmp_path.glob("results-later-*.png"))) == 2, "two sets of one release, a picture each"
 
 
 def test_results_are_read_as_the_contract_says(tmp_path: Path) -> None:

@@ -128,7 +128,8 @@ def write_report(
     cases = cases_of(labels, found)
     rivals = {name: cases_of(labels, verdicts) for name, verdicts in applied(found).items()}
     table, commit = _table(cases, rivals), "+".join(sorted({c.found.commit for c in cases}))
-    plot = page.with_name(f"{page.stem}-{manifest['set']}-{manifest['software'].split()[-1]}.png")
+    # By seed: one release may make two sets, and each keeps its picture.
+    plot = page.with_name(f"{page.stem}-{manifest['set']}-{manifest['seed']}.png")
     parts = [
         f"## Set `{manifest['set']}`, diagnosed by commit {commit}",
         f"Seed {manifest['seed']}; the first {len(labels)} cases of {_size_of(manifest)}; {len(cases)} diagnosed; "
