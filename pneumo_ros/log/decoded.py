@@ -16,7 +16,7 @@ from rosbags.serde import SerdeError
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.generic import columns_of, joints_of
-from pneumo_ros.log.layouts import Layout, UnfitError, decode, layout_of, type_store
+from pneumo_ros.log.layouts import Layout, UnfitError, decode, lacks_standard_fields, layout_of, type_store
 from pneumo_ros.log.records import Records
 from pneumo_ros.log.topic_data import Columns, Joint, Scalar, TopicInfo
 from pneumo_ros.rig import Rig, parse_rig
@@ -24,6 +24,8 @@ from pneumo_ros.rig import Rig, parse_rig
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FLUID_PRESSURE = "sensor_msgs/msg/FluidPressure"
 STRING = "std_msgs/msg/String"
+DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
+READ_BY_FIELD = (JOINT_STATE, FLUID_PRESSURE, STRING, DIAGNOSTIC_ARRAY)
 CONFIG_TOPIC = "/rig/config"
 STAMP = ("header.stamp.sec", "header.stamp.nanosec")
 SECOND = 1_000_000_000  # ns
@@ -174,6 +176,7 @@ class Log:
         info = self.info(topic)
         if info.encoding != "cdr":
             raise self._broken(topic, f"message encoding {info.encoding!r} cannot be decoded")
+        self._check_fields(topic)
         store = type_store(info.type, info.schema_encoding, info.schema)
         records = self._records[topic]
         for i, log_time in enumerate(records.log_time_ns.tolist()):
@@ -211,7 +214,16 @@ class Log:
             raise self._broken(topic, f"type {self.topics[topic].type}, expected {wanted}")
         if self.topics[topic].count == 0:
             raise self._broken(topic, "the topic holds no messages")
+        self._check_fields(topic)
         return self.columns(topic)
+
+    def _check_fields(self, topic: str) -> None:
+        """What is read by its fields' names has them: a definition may say anything below a standard name."""
+        info = self.info(topic)
+        if info.type not in READ_BY_FIELD or info.encoding != "cdr":
+            return
+        if lacks_standard_fields(type_store(info.type, info.schema_encoding, info.schema), info.type):
+            raise self._broken(topic, f"the log's definition of {info.type} is not the standard one")
 
     def _broken(self, topic: str, what: str) -> InputError:
         return InputError(what, where=self.path, key=topic)

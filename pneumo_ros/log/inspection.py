@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
-from pneumo_ros.log.decoded import CONFIG_TOPIC, Log
+from pneumo_ros.log.decoded import CONFIG_TOPIC, DIAGNOSTIC_ARRAY, Log
 from pneumo_ros.rig import load_rig
 
 SECOND = 1e9  # ns
 GAP_FACTOR = 1.5  # a pause longer than this many periods is a gap: half way to one missed sample
 JUMP = 0.1  # s; delays that change by more from one message to the next mean that a clock was set
 _PERIODIC = 10  # fewer messages say nothing about a rate
-DIAGNOSTIC_ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 PARAMETER_EVENT = "rcl_interfaces/msg/ParameterEvent"
 _IRREGULAR = (DIAGNOSTIC_ARRAY, PARAMETER_EVENT)
 

@@ -101,11 +101,34 @@ def type_store(name: str, encoding: str, definition: str) -> Typestore:
     return store
 
 
+@lru_cache(maxsize=1)
+def _standard() -> Typestore:
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+@lru_cache(maxsize=256)
+def lacks_standard_fields(store: Typestore, name: str) -> bool:
+    """Whether the log's definition of a type of ROS 2's own lacks a field that the standard one has, at any depth."""
+    standard = _standard()
+    open_names, seen = [name], set[str]()
+    while open_names:
+        one = open_names.pop()
+        if one in seen or one not in standard.fielddefs:
+            continue
+        seen.add(one)
+        wanted = standard.fielddefs[one][1]
+        own = dict(store.fielddefs[one][1]) if one in store.fielddefs else {}
+        if any(own.get(field) != kind for field, kind in wanted):
+            return True
+        open_names += _named(wanted)
+    return False
+
+
 def _fill(store: Typestore) -> None:
     """Nested types that the schema leaves out, from the standard ones."""
     missing = {name for _, fields in store.fielddefs.values() for name in _named(fields)} - set(store.fielddefs)
     if missing:
-        standard = get_typestore(Stores.ROS2_JAZZY)
+        standard = _standard()
         store.register({name: standard.fielddefs[name] for name in missing})
         _fill(store)
 

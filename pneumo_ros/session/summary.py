@@ -98,7 +98,11 @@ def load_session(path: Path | str) -> Recorded:
     log = read_log(path)
     if log.config is None:
         raise InputError("no /rig/config in the log", where=path, remedy="record it, or give a log of this rig")
-    start = min(int(log.joint(t.name).stamp_ns[0]) for t in (topics.COMMAND, topics.DISPLACEMENT) if _has(log, t))
+    begun = [int(log.joint(t.name).stamp_ns[0]) for t in (topics.COMMAND, topics.DISPLACEMENT) if _has(log, t)]
+    if not begun:
+        raise InputError(f"holds neither {topics.COMMAND.name} nor {topics.DISPLACEMENT.name}", where=path,
+                         remedy="record one of them, or give a log of this rig")  # fmt: skip
+    start = min(begun)
 
     def columns(topic: topics.Topic) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if not _has(log, topic):

@@ -81,6 +81,12 @@ def test_mutated_logs_end_in_an_error_of_one_line_or_in_messages(tmp_path: Path)
     assert {"read", "refused"} <= set(outcomes) and outcomes.count("read") > 3
 
 
+# A standard type under a definition without its fields; a log whose displacement and command are gone.
+@pytest.mark.parametrize("seed", [2662, 4107, 4189, 4420, 7241, 9875])
+def test_what_ten_thousand_mutations_found_stays_mended(seed: int, tmp_path: Path) -> None:
+    assert read_everything(mutated_log(seed), tmp_path) in ("read", "refused")
+
+
 def test_mutated_configurations_end_in_an_error_of_one_line_or_in_a_configuration(tmp_path: Path) -> None:
     outcomes = [mutated_config(seed, tmp_path) for seed in range(40)]
     assert set(outcomes) == {"read", "refused"} and len(CONFIGS) >= 4
