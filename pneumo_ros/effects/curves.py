@@ -19,7 +19,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.effects.composition import PlantTerm, Slot
 from pneumo_ros.effects.contract import Effect, Inputs, Memory, Plant, channels_of, ends_of
 from pneumo_ros.effects.drive import Drive
-from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of, tyre_of
+from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, strut_of, tyre_loads, tyre_of
 from pneumo_ros.effects.parameters import Active, Axis, Curve, family_of
 from pneumo_ros.plant.air_spring import AreaSurface
 from pneumo_ros.units import GAS_CONSTANT
@@ -237,7 +237,8 @@ def _row(
     air = air_of(pressure, strut.height, strut.rate, inlet, outlet, gas.supply_pressure, gas.supply_power, gas)
     slope = (inputs.road[i + 1, end] - inputs.road[i, end]) / period
     stiffness = (body.tyre_stiffness_front, body.tyre_stiffness_rear)[end]
-    return _Row(strut, air, tyre_of(top, axle, top_rate, axle_rate, inputs.road[i, end], slope, stiffness))
+    load = tyre_loads(body)[end]
+    return _Row(strut, air, tyre_of(top, axle, top_rate, axle_rate, inputs.road[i, end], slope, stiffness, load))
 
 
 def _along(model: Running, parts: Sequence[Active], run: _Run, shared: bool) -> Array:

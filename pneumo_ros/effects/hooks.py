@@ -10,6 +10,7 @@ top, axle, top_rate, axle_rate : heights above the ground datum, m, and their ra
 road, slope : height of the ground, m, and its rate, m/s
 gauge : pressure over ambient, Pa
 scale, damping, stiffness : factor on the area, 1; of the bushing, N s/m; of the tyre, N/m
+load : what the tyre carries at rest, N
 pressure, supply, supply_power : absolute, Pa, and (P_ref / supply)^((n - 1) / n), 1
 height, rate : of the spring, m and m/s, extension positive
 inlet, outlet : openings, m2
@@ -26,7 +27,7 @@ from numba import njit
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, outlet_flow, pressure_power
 from pneumo_ros.plant.half_car import Body
 from pneumo_ros.plant.orifice import clamped_flow_function
-from pneumo_ros.units import GAS_CONSTANT
+from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 
 
 class Strut(NamedTuple):
@@ -65,13 +66,14 @@ class Air(NamedTuple):
 
 class Tyre(NamedTuple):
     """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle),
-    middle m and its rate m/s as of the strut."""
+    middle m and its rate m/s as of the strut, compression at rest m."""
 
     compression: float
     rate: float
     force: float
     middle: float
     middle_rate: float
+    rest: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -95,12 +97,29 @@ def strut_of(
 
 
 @njit(cache=True, error_model="numpy")
+def tyre_loads(body: Body) -> tuple[float, float]:
+    """What the tyres carry at rest, N, front and rear."""
+    front, rear, weight = body.front_arm, body.rear_arm, body.sprung_mass / (body.front_arm + body.rear_arm)
+    return (
+        GRAVITY * (weight * rear + body.unsprung_mass_front),
+        GRAVITY * (weight * front + body.unsprung_mass_rear),
+    )
+
+
+@njit(cache=True, error_model="numpy")
 def tyre_of(
-    top: float, axle: float, top_rate: float, axle_rate: float, road: float, slope: float, stiffness: float
+    top: float,
+    axle: float,
+    top_rate: float,
+    axle_rate: float,
+    road: float,
+    slope: float,
+    stiffness: float,
+    load: float,
 ) -> Tyre:
     """The nominal tyre below a strut."""
-    force = stiffness * (road - axle)
-    return Tyre(road - axle, slope - axle_rate, force, 0.5 * (top + axle), 0.5 * (top_rate + axle_rate))
+    force, rest = stiffness * (road - axle), load / stiffness
+    return Tyre(road - axle, slope - axle_rate, force, 0.5 * (top + axle), 0.5 * (top_rate + axle_rate), rest)
 
 
 @njit(cache=True, error_model="numpy")

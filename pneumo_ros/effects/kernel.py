@@ -21,7 +21,7 @@ import numpy as np
 from numba import njit
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, air_rate, strut_of, tyre_of
+from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, air_rate, strut_of, tyre_loads, tyre_of
 from pneumo_ros.effects.terms import added, advanced, at_rest, parameters, restored, sagged, started, stored, switches
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
 from pneumo_ros.plant.half_car import Body, State, accelerations, moved
@@ -93,6 +93,7 @@ def ends(
     top_f, top_r = sprung_points(z, q, body.front_arm, body.rear_arm)
     rate_f, rate_r = sprung_points(v, w, body.front_arm, body.rear_arm)
     hf, hr, hfv, hrv = top_f - zuf, top_r - zur, rate_f - vuf, rate_r - vur
+    load_f, load_r = tyre_loads(body)
     return Signals(
         strut_of(top_f, zuf, rate_f, vuf, pf - front.ambient_pressure, body.area_scale_front, body.damping_front, body,
                  surface),
@@ -100,8 +101,8 @@ def ends(
                  surface),
         air_of(pf, hf, hfv, u[0], u[2], feed.pressure_f, feed.power_f, front),
         air_of(pr, hr, hrv, u[1], u[3], feed.pressure_r, feed.power_r, rear),
-        tyre_of(top_f, zuf, rate_f, vuf, height_f, slope_f, body.tyre_stiffness_front),
-        tyre_of(top_r, zur, rate_r, vur, height_r, slope_r, body.tyre_stiffness_rear),
+        tyre_of(top_f, zuf, rate_f, vuf, height_f, slope_f, body.tyre_stiffness_front, load_f),
+        tyre_of(top_r, zur, rate_r, vur, height_r, slope_r, body.tyre_stiffness_rear, load_r),
     )  # fmt: skip
 
 

@@ -101,7 +101,7 @@ EFFECTS = (
         "heat_transfer",
         ["wall", "enthalpy", "exponent"],
         "heat from the wall and with the inflow, of any law",
-        alone="exponent",
+        alone=("exponent",),
     ),
     AIR.shape("dead_volume", ["volume"], "a volume that is not V(h), of any law"),
     AIR.anything(),

@@ -51,7 +51,7 @@ class Term:
     sites: tuple[str, ...]
     places: tuple[str, ...]
 
-    def shape(self, family: str, names: Sequence[str], summary: str, alone: str = "") -> Effect:
+    def shape(self, family: str, names: Sequence[str], summary: str, alone: tuple[str, ...] = ()) -> Effect:
         """The shape of a family: its atoms by name, or by the first word of their names; those that begin with
         ``alone`` are tried alone as well.
         """

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness.
 
+A contact that only pushes has a force that is convex over the compression: ramps at its end, and a progressive part
+that agrees with the linear tyre without load and at rest. All are in proportion to the compression at rest, so that
+both ends may share them.
+
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
@@ -15,16 +19,16 @@ from pneumo_ros.effects.shapes.atoms import Atom, Term
 
 RATES = (0.03, 0.15)  # m/s
 SLACKS = (3e-4, 1.5e-3)  # m
-LIFTS = (0.0, 1e-3, 2e-3)  # m of compression below which the force is taken away
+LIFTS = (0.0, 0.05, 0.15, 0.35, 0.7)  # shares of the compression at rest below which force is taken away
 
 ATOMS = (
     Atom("loss", "N s/m", 20.0),
     *(Atom(f"loss {r:g} m/s", "N", 3.0) for r in RATES),
     Atom("loss over load", "N s/m", 20.0),
     *(Atom(f"loss slider {s:g} m", "N", 3.0) for s in SLACKS),
-    *(Atom(f"lift below {c:g} m", "N/m", 5e3) for c in LIFTS),
-    Atom("stiffness squared", "N/m2", 1e5, signed=True),
-    Atom("constant", "N", 2.0, signed=True),
+    *(Atom(f"lift below {100.0 * c:g} %", "N/m", 5e3) for c in LIFTS),
+    Atom("progressive", "N/m", 500.0),
+    Atom("constant", "N/m", 100.0, signed=True),
 )
 State = tuple[float, float]
 Values = tuple[float, ...]
@@ -40,16 +44,22 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 @njit(cache=True, error_model="numpy")
 def tyre(tyre: Tyre, z: State, p: Values) -> float:
     """Sum of the atoms."""
-    v, c = tyre.rate, tyre.compression
+    v, c, rest = tyre.rate, tyre.compression, tyre.rest
     out = p[0] * v + p[1] * min(max(v / 0.03, -1.0), 1.0) + p[2] * min(max(v / 0.15, -1.0), 1.0)
     out += p[3] * v * max(0.0, c) / 0.02 + p[4] * z[0] + p[5] * z[1]
-    out += p[6] * max(0.0, -c) + p[7] * max(0.0, 1e-3 - c) + p[8] * max(0.0, 2e-3 - c)
-    return out + p[9] * c * abs(c) + p[10]
+    out += p[6] * max(0.0, -c) + p[7] * max(0.0, 0.05 * rest - c) + p[8] * max(0.0, 0.15 * rest - c)
+    out += p[9] * max(0.0, 0.35 * rest - c) + p[10] * max(0.0, 0.7 * rest - c)
+    return out + p[11] * c * (c / rest - 1.0) + p[12] * rest
 
 
 TYRE = Term("tyre", PlantTerm(states=2, advance=advance, tyre=tyre), ATOMS, ENDS, ("{end}_tyre",))
 EFFECTS = (
     TYRE.shape("tyre_damping", ["loss"], "losses of the tyre of any law"),
-    TYRE.shape("tyre_liftoff", ["lift"], "a tyre that stops pulling, of any law"),
+    TYRE.shape(
+        "tyre_liftoff",
+        ["lift", "progressive", "constant"],
+        "a tyre that stops pulling, of any law: its force is convex over the compression",
+        alone=("lift", "progressive"),
+    ),
     TYRE.anything(),
 )
