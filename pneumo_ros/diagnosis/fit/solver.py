@@ -81,11 +81,16 @@ def cost_of(
     r = residual[rows]
     if not np.all(np.isfinite(r)):
         return np.inf
-    limit = HUBER * robust_scale(r)
-    magnitude = np.abs(r)
-    with np.errstate(over="ignore"):  # the branch that is not taken
-        rho = np.where(magnitude <= limit, r * r, limit * (2.0 * magnitude - limit))
-    return float(r.size / correlation * np.log(COST_FLOOR + rho.mean()) + (prior * x) @ x)
+    return float(r.size / correlation * np.log(COST_FLOOR + robust_mean(r)) + (prior * x) @ x)
+
+
+def robust_mean(residual: Array) -> float:
+    """Mean square of which large residuals count linearly (Huber); inf or NaN for a diverged prediction."""
+    limit = HUBER * robust_scale(residual)
+    magnitude = np.abs(residual)
+    with np.errstate(over="ignore", invalid="ignore"):  # the branch that is not taken
+        rho = np.where(magnitude <= limit, residual * residual, limit * (2.0 * magnitude - limit))
+    return float(rho.mean())
 
 
 def robust_scale(residual: Array) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance
 from pneumo_ros.diagnosis.judge.budget import Budget
+from pneumo_ros.diagnosis.judge.closable import WORTH
 from pneumo_ros.diagnosis.judge.closable import Remainder as Closing
 from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
@@ -21,8 +21,6 @@ from pneumo_ros.diagnosis.model import HasCurves
 from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry, Remainder
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.effects.parameters import ANYTHING, Active, Curve, family_of
-
-WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ is left, and can be closed by no family of the structure, is the remainder.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
 SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
+WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -42,6 +43,8 @@ class EffectEvidence:
     share : what it holds of what the refit leaves
     leaves : what the structure leaves over what is left with whatever may act at its places: held-out gaps with nothing
         subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated
+    beside : the same beside whatever may act where most of the rest lies, over what it holds without that; 1 where no
+        such place is known
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -55,6 +58,7 @@ class EffectEvidence:
     at_bounds: float = 0.0
     bent: float = 0.0
     leaves: float = 1.0
+    beside: float = 1.0
 
     @property
     def family(self) -> str:
@@ -132,7 +136,20 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         added(tuple(places[:TOGETHER]))
         added((places[0],))
     found = sorted((r for r in remainders.values() if r.gap < own), key=lambda r: r.gap)
+    if found and found[0].gap < (1.0 - WORTH) * own:
+        evidence = [_beside(problem, best, holdout, floor, one, found[0]) for one in evidence]
     return Closable(tuple(evidence), tuple(found), own)
+
+
+def _beside(
+    problem: Problem, best: Fit, holdout: Any, floor: float, one: EffectEvidence, rest: Remainder
+) -> EffectEvidence:
+    """The evidence with what is missed of an effect once something acts where the rest lies."""
+    if set(one.places) & set(rest.places) or one.without <= one.own:
+        return one
+    bare = reduced(problem, rest.fit, of_law(best.candidate, one.law), STEPS, _all(problem))
+    missed = _above(held_by(problem, bare, holdout).total, floor) - rest.gap if not bare.diverged else np.inf
+    return replace(one, beside=float(np.clip(missed / (one.without - one.own), 0.0, 1.0)))
 
 
 def _above(gap: float, floor: float) -> float:

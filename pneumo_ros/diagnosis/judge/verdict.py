@@ -19,7 +19,7 @@ import numpy as np
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.search.screening import SENSOR
-from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.diagnosis.search.selection import SHARPNESS, Scored, by_families, log_weight
 from pneumo_ros.effects.parameters import family_of
 
 
@@ -29,8 +29,6 @@ class Calibration:
 
     Attributes
     ----------
-    sharpness : fall of log probability per unit of log mean square of the fitted data: as many samples' worth of
-        evidence, however long the log, because laws differ by more than chance does
     first_penalty, second_penalty : of log probability, for a first and a second effect: what chance wins
     closes : share (rms) of what can be closed at an effect's places that its family must close to be as likely as
         "something else acts there"
@@ -40,6 +38,8 @@ class Calibration:
     real : mean square of the refit above which a gap without a name counts as unknown rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
+    beside : share of what an effect holds that it must still hold beside whatever may act where the rest of the gap
+        lies: a wrong name does the work of what is missing, and nobody misses it once that is there
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
@@ -48,7 +48,6 @@ class Calibration:
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
     """
 
-    sharpness: float = 36.0
     first_penalty: float = 9.0
     second_penalty: float = 9.0
     closes: float = 0.5
@@ -59,6 +58,7 @@ class Calibration:
     bent: float = 0.25
     least: float = 0.002
     slight: float = 0.12
+    beside: float = 0.2
     traces: float = 0.4
     held_real: float = 3.0
 
@@ -168,7 +168,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
-               c.slight / max(closed, 1e-9), c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
+               c.slight / max(closed, 1e-9), c.beside / max(one.beside, 1e-9),
+               c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
     if one.places[0].startswith(
         SENSOR
     ):  # what moves the rig looks like a sensor's error as well: no less than it is left
@@ -185,20 +186,35 @@ def _in_structure(named: Mapping[Candidate, float], law: Part) -> float:
 def structures(
     refit: Scored, finalists: Sequence[Scored], chosen: Scored, calibration: Calibration
 ) -> dict[Candidate, float]:
-    """Softmax of the training costs, parameters and effects paying their price; the selection has the last word."""
+    """Probability of the refit and of every finalist, 0..1, one in sum; the selection has the last word twice.
+
+    Whether anything acts is judged by the training costs, each parameter and effect paying its price; which structure
+    it is, by what laws of the right kind may leave (:func:`~pneumo_ros.diagnosis.search.selection.log_weight`).
+    """
     c = calibration
+    some = [one for one in finalists if one.size]
+    if not some:
+        return {refit.fit.candidate: 1.0}
 
-    def log_weight(s: Scored) -> float:
-        penalty = c.first_penalty * min(s.size, 1) + c.second_penalty * max(s.size - 1, 0)
-        return -c.sharpness * s.price / s.samples - penalty
+    def plain(one: Scored) -> float:
+        return -SHARPNESS * one.price / one.samples - c.first_penalty * min(one.size, 1)
 
-    log_weights = {s.fit.candidate: log_weight(s) for s in (refit, *finalists)}
-    top = max(log_weights.values())
-    # What the selection blocks chose is at least as probable as any other.
-    log_weights[chosen.fit.candidate] = max(top, log_weights[chosen.fit.candidate])
-    weights = {c: float(np.exp(w - top)) for c, w in log_weights.items()}
+    odds = max(map(plain, some)) - plain(refit)
+    # What the selection chose is at least as probable as any other.
+    odds = max(odds, 0.0) if chosen.size else min(odds, 0.0)
+    acts = 1.0 / (1.0 + float(np.exp(-np.clip(odds, -700.0, 700.0))))
+    logs: dict[Candidate, float] = {}
+    for group in by_families(some).values():
+        leader = log_weight(group[0], refit) - c.second_penalty * (group[0].size - 1)
+        prices = [-SHARPNESS * (one.price - group[0].price) / one.samples for one in group]
+        share = leader - float(np.log(np.sum(np.exp(prices))))
+        logs |= {one.fit.candidate: share + price for one, price in zip(group, prices, strict=True)}
+    top = max(logs.values())
+    if chosen.size:
+        logs[chosen.fit.candidate] = top
+    weights = {candidate: float(np.exp(value - top)) for candidate, value in logs.items()}
     total = sum(weights.values())
-    return {c: w / total for c, w in weights.items()}
+    return {refit.fit.candidate: 1.0 - acts} | {one: acts * w / total for one, w in weights.items()}
 
 
 def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration) -> float:

@@ -42,8 +42,8 @@ IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without
 def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     """Fill ``search.structures``: leading singles and pairs with their shapes, and what grows from the best."""
     search.progress(0.82, "shapes")
-    for found, count in zip((search.singles, search.pairs), SHAPED, strict=True):
-        search.structures += [with_shapes(search.problem, one) for one in found[:count]]
+    leading = [*search.singles[: SHAPED[0]], *_rivals_of_first(search), *search.pairs[: SHAPED[1]]]
+    search.structures += [with_shapes(search.problem, one) for one in leading]
     best = _selected(search, limits)
     if further and best.size and room_for_more(search):
         _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
@@ -53,6 +53,22 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
+
+
+def _rivals_of_first(search: Search) -> list[Fit]:
+    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says little
+    of what they leave by another.
+    """
+    problem, found = search.problem, search.singles
+    if not found:
+        return []
+    taken = {family_of(law[0]) for one in found[: SHAPED[0]] for law in one.candidate.laws}
+    rivals: dict[str, Fit] = {}
+    for one in found[SHAPED[0] :]:
+        (law,) = one.candidate.laws
+        if family_of(law[0]) not in taken and _rival(problem, found[0].candidate.laws[0], law):
+            rivals.setdefault(family_of(law[0]), one)
+    return list(rivals.values())
 
 
 def _climb(search: Search, start: Scored, evident: float) -> None:
@@ -219,8 +235,8 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(search, bare, probed(problem, bare, screened)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)
+        search.structures.append(other)  # the worse one as well: it may be as likely
         if score(problem, other).price < score(problem, found).price:
-            search.structures.append(other)
             return other
     return found
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which structure the blocks kept from the fit prefer: the smallest that is within one standard error of the best.
+"""Which structure the logs prefer: of each number of effects the likeliest, and the most effects that are evident.
 
-Scores are logarithms of the mean square on the selection blocks; a richer structure must beat a poorer one by more than
-structures without a true effect do (null thresholds, made by bench/null_distribution.py), and by more than the laws of
-the library are true to.
+Among structures of the same families the one of lowest price; among those of others, with as many effects, the one of
+largest weight (:func:`log_weight`): what is left on the fitted and on the kept blocks counts only beyond what laws of
+the right kind leave, and each unknown has its price.
+A richer structure must beat a poorer one on the kept blocks by more than structures without a true effect do (null
+thresholds, made by bench/null_distribution.py), and by more than the laws of the library are true to.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.fit.solver import Fit, robust_mean
+from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.paths import share_file
 
 # Mean square, sigma squared, that is added to both levels compared: what model form leaves is no evidence [taste]
@@ -26,6 +29,14 @@ FORM: Final = 0.5
 PARAMETER_PENALTY: Final = 4.0  # cost of each parameter, and of each effect that is claimed at both ends [taste]
 UNUSED: Final = 1e-3  # share of a typical amplitude below which an atom counts as absent [numerics]
 SAME: Final = 0.05  # relative difference of levels that counts as none, whatever the blocks say [taste]
+# Mean square, sigma squared, that laws of the right kind leave beside noise and their own share of the misfit: where
+# two families leave less, what is left does not tell them apart [calibration]
+ALIKE: Final = 1.0
+LAW_SHARE: Final = 0.05  # of the refit's root mean square: what laws of the right kind leave [calibration]
+# Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
+# laws differ by more than chance does [calibration]
+SHARPNESS: Final = 36.0
+PER_UNKNOWN: Final = 1.0  # log weight that each unknown used costs: what could fit anything proves less [calibration]
 
 
 @dataclass(frozen=True)
@@ -90,6 +101,8 @@ class Scored:
     blocks : (B,) mean square of each selection block
     stretch : sum of squares of the nuisance parameters, in prior sigmas
     samples : effective number of fitted samples, what the training cost grows with
+    fitted : robust mean square of the fitted samples, sigmas
+    strain : what the unknowns' prior adds to the training cost
     """
 
     fit: Fit
@@ -97,6 +110,8 @@ class Scored:
     blocks: Array
     stretch: float
     samples: float = 600.0
+    fitted: float = 1.0
+    strain: float = 0.0
 
     @property
     def size(self) -> int:
@@ -108,9 +123,12 @@ class Scored:
         """Training cost with :data:`PARAMETER_PENALTY` for each parameter used and each effect claimed at both ends: an
         effect at one end is preferred where the other end's was not seen, because on another road it would act.
         """
-        laws = self.fit.candidate.laws
-        wide = sum(site == "both" for _, site in laws)
-        return self.fit.cost + PARAMETER_PENALTY * (used_unknowns(self.fit) + wide)
+        return self.fit.cost + PARAMETER_PENALTY * self.claims
+
+    @property
+    def claims(self) -> int:
+        """Unknowns used, and effects claimed at both ends."""
+        return used_unknowns(self.fit) + sum(site == "both" for _, site in self.fit.candidate.laws)
 
 
 def used_unknowns(fit: Fit) -> int:
@@ -129,13 +147,45 @@ def score(problem: Problem, fit: Fit) -> Scored:
     values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
     stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
     samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
-    return Scored(fit, float(np.mean(values)), values, stretch, float(samples))
+    fitted = robust_mean(fit.residual[problem.fitted])
+    strain = float((problem.prior(fit.candidate) * fit.x) @ fit.x)
+    return Scored(fit, float(np.mean(values)), values, stretch, float(samples), fitted, strain)
 
 
 def noise_level(problem: Problem) -> float:
     """What sensor noise and a stated model form leave of the mean square: less than one, sigmas hold a floor beside."""
     there = problem.weight > 0.0
     return float(np.sum((problem.weight * problem.expected) ** 2) / max(1, there.sum()))
+
+
+def log_weight(one: Scored, refit: Scored) -> float:
+    """Of a structure among others with as many effects: what it leaves of fitted and kept samples, half and half, and
+    what it claims for that.
+
+    What laws of the right kind leave (:data:`ALIKE`, :data:`LAW_SHARE`) is added to both levels: two families that both
+    leave less are told apart by what they need for it alone.
+    """
+    pairs = ((refit.fitted, one.fitted), (refit.level, one.level))
+    left = [float(np.log(ALIKE + LAW_SHARE**2 * whole + level)) for whole, level in pairs]
+    return -SHARPNESS * (0.5 * sum(left) + one.strain / one.samples) - PER_UNKNOWN * one.claims
+
+
+def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Scored]]:
+    """Structures of the same families, wherever these act, the one of lowest price first.
+
+    Laws of one family differ by what chance does: there the training cost counts in full, and what is left at a site
+    that was not claimed is no matter of form.
+    """
+    groups: dict[frozenset[str], list[Scored]] = {}
+    for one in sorted(structures, key=lambda s: s.price):
+        groups.setdefault(frozenset(family_of(effect) for effect, _ in one.fit.candidate.laws), []).append(one)
+    return groups
+
+
+def likeliest(refit: Scored, rivals: Sequence[Scored]) -> Scored:
+    """Of structures with as many effects."""
+    leaders = [group[0] for group in by_families(rivals).values()]
+    return max(leaders, key=lambda one: log_weight(one, refit))
 
 
 def advantage(poorer: Scored, richer: Scored) -> float:
@@ -161,7 +211,7 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         rivals = [f for f in finalists if f.size == size]
         if not rivals:
             continue
-        best = _simplest(rivals)
+        best = likeliest(refit, rivals)
         poorer = chosen
         fallen = poorer.level - best.level
         paid = poorer.fit.cost - best.fit.cost
@@ -174,14 +224,3 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         if evidence:
             chosen = best
     return chosen
-
-
-def _simplest(rivals: Sequence[Scored]) -> Scored:
-    """Among those within one standard error of the best: the lowest price.
-
-    The training cost holds the prior of the nuisance parameters, which the selection blocks do not see: of two
-    structures that predict alike, the one that needs no stretched tolerance is right.
-    """
-    best = min(rivals, key=lambda s: s.level)
-    close = [s for s in rivals if s.level - best.level <= max(standard_error(s, best), SAME * best.level)]
-    return min(close, key=lambda s: s.price)

@@ -21,7 +21,8 @@ from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.shapes.atoms import Atom, Term
 from pneumo_ros.units import INCH
 
-RATES = (0.012, 0.04, 0.13, 0.4)  # m/s at which a ramp saturates; shorter ones stick, which sliders do
+RATES = (0.012, 0.022, 0.04, 0.13, 0.4)  # m/s at which a ramp saturates; shorter ones stick, which sliders do
+FRICTION, DAMPING = RATES[:2], RATES[1:]  # of a valve that blows off soon and of a soft friction: either may be called
 SLACKS = (6e-5, 3e-4, 1.2e-3, 4e-3, 1.2e-2)  # m of travel before a slider slips
 STOPS = (0.0335, 0.036, 0.0385, 0.041, 0.043)  # m, heights below which a stop's ramps begin
 STRAPS = (0.0485, 0.051, 0.0535)  # m, heights above which a strap's begin
@@ -87,40 +88,40 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 def force(strut: Strut, z: State, p: Values) -> float:
     """Sum of the atoms."""
     v, h, load = strut.rate, strut.height, strut.gauge / GAUGE
-    out = p[38]
+    out = p[40]
     if v > 0.0:
-        out -= p[0] * min(v / 0.012, 1.0) + p[1] * min(v / 0.04, 1.0) + p[2] * min(v / 0.13, 1.0)
-        out -= p[3] * min(v / 0.4, 1.0) + p[4] * v + p[5] * v * v
+        out -= p[0] * min(v / 0.012, 1.0) + p[1] * min(v / 0.022, 1.0) + p[2] * min(v / 0.04, 1.0)
+        out -= p[3] * min(v / 0.13, 1.0) + p[4] * min(v / 0.4, 1.0) + p[5] * v + p[6] * v * v
     else:
         w = -v
-        out += p[6] * min(w / 0.012, 1.0) + p[7] * min(w / 0.04, 1.0) + p[8] * min(w / 0.13, 1.0)
-        out += p[9] * min(w / 0.4, 1.0) + p[10] * w + p[11] * w * w
-    out -= p[12] * load * min(max(v / 0.012, -1.0), 1.0)
-    out -= p[13] * z[0] + p[14] * z[1] + p[15] * z[2] + p[16] * z[3] + p[17] * z[4]
+        out += p[7] * min(w / 0.012, 1.0) + p[8] * min(w / 0.022, 1.0) + p[9] * min(w / 0.04, 1.0)
+        out += p[10] * min(w / 0.13, 1.0) + p[11] * min(w / 0.4, 1.0) + p[12] * w + p[13] * w * w
+    out -= p[14] * load * min(max(v / 0.012, -1.0), 1.0)
+    out -= p[15] * z[0] + p[16] * z[1] + p[17] * z[2] + p[18] * z[3] + p[19] * z[4]
     if h < 0.043:
-        out += p[18] * max(0.0, 0.0335 - h) + p[19] * max(0.0, 0.036 - h) + p[20] * max(0.0, 0.0385 - h)
-        out += p[21] * max(0.0, 0.041 - h) + p[22] * (0.043 - h)
+        out += p[20] * max(0.0, 0.0335 - h) + p[21] * max(0.0, 0.036 - h) + p[22] * max(0.0, 0.0385 - h)
+        out += p[23] * max(0.0, 0.041 - h) + p[24] * (0.043 - h)
         near, far = min(max((0.041 - h) / TOUCHING, 0.0), 1.0), min(max((0.0365 - h) / TOUCHING, 0.0), 1.0)
-        out -= (p[26] * v + p[28] * min(v, 0.0)) * near + p[27] * v * far
+        out -= (p[28] * v + p[30] * min(v, 0.0)) * near + p[29] * v * far
     if h > 0.0485:
-        out -= p[23] * (h - 0.0485) + p[24] * max(0.0, h - 0.051) + p[25] * max(0.0, h - 0.0535)
+        out -= p[25] * (h - 0.0485) + p[26] * max(0.0, h - 0.051) + p[27] * max(0.0, h - 0.0535)
     x = (h - MIDDLE) / SWING
-    out += strut.gauge * strut.area * (p[29] + p[30] * x + p[31] * x * x + p[32] * (load - 1.0))
-    out += p[33] * (h - MIDDLE) + p[34] * x * abs(x)
-    return out - p[35] * (h - z[5]) - p[36] * (h - z[6]) - p[37] * (h - z[7])
+    out += strut.gauge * strut.area * (p[31] + p[32] * x + p[33] * x * x + p[34] * (load - 1.0))
+    out += p[35] * (h - MIDDLE) + p[36] * x * abs(x)
+    return out - p[37] * (h - z[5]) - p[38] * (h - z[6]) - p[39] * (h - z[7])
 
 
 FORCE = Term("force", PlantTerm(states=8, start=start, advance=advance, force=force), ATOMS, ENDS, ("{end}_force",))
 EFFECTS = (
     FORCE.shape(
         "coulomb_friction",
-        [f"friction_out {r:g} m/s" for r in RATES[:2]] + [f"friction_in {r:g} m/s" for r in RATES[:2]]
+        [f"friction_out {r:g} m/s" for r in FRICTION] + [f"friction_in {r:g} m/s" for r in FRICTION]
         + ["load_friction", *(f"slider {s:g} m" for s in SLACKS[:3])],
         "dry friction of any law: saturating in rate, with or without sticking",
     ),
     FORCE.shape(
         "viscous_damping",
-        [f"friction_out {r:g} m/s" for r in RATES[2:]] + [f"friction_in {r:g} m/s" for r in RATES[2:]]
+        [f"friction_out {r:g} m/s" for r in DAMPING] + [f"friction_in {r:g} m/s" for r in DAMPING]
         + ["damping_out", "damping_in"],
         "damping of any law: grows with rate, unlike out and in",
     ),

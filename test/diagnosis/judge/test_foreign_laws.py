@@ -8,6 +8,7 @@ import pytest
 from helpers.own_logs import QUICK, drawn, log
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.half_car.from_logs import FlexibleSearch
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -32,7 +33,12 @@ def atoms(model: RigModel, effect: str, site: str, **amplitudes: float) -> Activ
 
 def found_on(model: RigModel, *truth: Active) -> Diagnosis:
     nuisance = drawn(model, 8)
-    return diagnose(model, [log(model, 1, nuisance, truth)], log(model, 2, nuisance, truth), Options(effort=QUICK))
+    return diagnose(
+        model,
+        [log(model, 1, nuisance, truth)],
+        log(model, 2, nuisance, truth),
+        Options(effort=QUICK, locate=FlexibleSearch()),
+    )
 
 
 @pytest.fixture(scope="module")
