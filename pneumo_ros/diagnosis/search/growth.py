@@ -56,8 +56,8 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
 
 
 def _rivals_of_first(search: Search) -> list[Fit]:
-    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says little
-    of what they leave by another.
+    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says
+    little of what they leave by another.
     """
     problem, found = search.problem, search.singles
     if not found:

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.shapes import air, force, mode, signals, supply, tyre
+from pneumo_ros.effects.shapes import air, body, force, mode, signals, supply, tyre
 
 SHAPES: dict[str, Effect] = {
-    effect.id: effect for room in (force, mode, air, tyre, supply, signals) for effect in room.EFFECTS
+    effect.id: effect for room in (body, force, mode, air, tyre, supply, signals) for effect in room.EFFECTS
 }
 # Place (its end, or its channel, as the site) -> what may act there.
 ANYTHING: dict[str, tuple[str, ...]] = {

@@ -56,6 +56,7 @@ ATOMS = (
     Atom("stiffness odd", "N", 2.0, signed=True),
     *(Atom(f"memory {t:g} s", "N/m", 500.0) for t in LAGS),
     Atom("constant", "N", 2.0, signed=True),
+    *(Atom(f"deep slider {s:g} m", "N", 3.0) for s in SLACKS[2:4]),
 )
 Values = tuple[float, ...]
 
@@ -108,6 +109,7 @@ def force(strut: Strut, z: State, p: Values) -> float:
     x = (h - MIDDLE) / SWING
     out += strut.gauge * strut.area * (p[31] + p[32] * x + p[33] * x * x + p[34] * (load - 1.0))
     out += p[35] * (h - MIDDLE) + p[36] * x * abs(x)
+    out -= max(0.0, 1.0 - x) * (p[41] * z[2] + p[42] * z[3])
     return out - p[37] * (h - z[5]) - p[38] * (h - z[6]) - p[39] * (h - z[7])
 
 
@@ -126,7 +128,9 @@ EFFECTS = (
         "damping of any law: grows with rate, unlike out and in",
     ),
     FORCE.shape(
-        "bellows_hysteresis", [f"slider {s:g} m" for s in SLACKS[2:]], "hysteresis of any law: sliders of every length"
+        "bellows_hysteresis",
+        [*(f"slider {s:g} m" for s in SLACKS[2:]), "deep"],
+        "hysteresis of any law: sliders of every length, some of which hold the better the deeper the spring is",
     ),
     FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height and may damp"),
     FORCE.shape("effective_area_error", ["area"], "an area error of any law over height and pressure"),

@@ -45,9 +45,12 @@ PLAYS = (2e-8, 8e-8, 2e-7)  # m2, half width
 EXCITER_LAGS = (0.002, 0.006, 0.02)  # s
 SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
 WAYS = ("rising", "falling")
+UNEVEN = (0.008, 0.03)  # s, lags one way of a valve that is quick the other way
+QUICK = 0.001  # s
 SHARE = 0.3
-PRESSURE_MIDDLE, PRESSURE_SWING = 3.5e5, 5e4  # Pa absolute
-LVDT_SWING = 0.01  # m
+RESTS = (0.0291, 0.0207, -0.0166, -0.0250, 2.77e5, 4.29e5)  # m, Pa absolute: CHANNELS of the nominal rig at rest
+PRESSURE_SWING, LVDT_SWING = 5e4, 0.01  # Pa, m: of a session
+KINKS = (0.0, 1.0)  # swings from the rest beyond which a sensor may have another sensitivity
 CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
 CREEPS_TRIED = (1, 3)  # which of them are tried alone
 LVDT_CREEP, PRESSURE_CREEP = 1e-3, 5e3  # m, Pa: where a creeping zero typically ends
@@ -153,32 +156,51 @@ def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: M
     return given._replace(road=road), memory
 
 
-def _sensor(name: str, summary: str, sites: tuple[str, ...], middle: float, swing: float, powers: Sequence[int],
-            lags: Sequence[float], follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
-    count, some = len(powers), len(powers) + len(lags) + (1 if follower else 0)
+def _static_error(x: Array, rest: float, swing: float, powers: Sequence[int], values: Values) -> Array:
+    """A sensor's error over its own reading, in the reading's unit: a polynomial about the rest, with kinks."""
+    z = (x - rest) / swing
+    out = np.zeros_like(z)
+    for value, power in zip(values, powers, strict=False):
+        out += value * z**power
+    for k, kink in enumerate(KINKS):
+        above, below = values[len(powers) + 2 * k : len(powers) + 2 * k + 2]
+        out += above * np.maximum(z - kink, 0.0) + below * np.minimum(z + kink, 0.0)
+    return np.asarray(swing * out)
 
-    def error(x: Array, values: Values) -> Array:
-        z = (x - middle) / swing
-        return np.asarray(swing * sum(v * z**power for v, power in zip(values[:count], powers, strict=True)))
+
+def _sensor(name: str, summary: str, sites: tuple[str, ...], swing: float, powers: Sequence[int],
+            lags: Sequence[float], follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
+    kinks = [f"{way} {kink:g}" for kink in KINKS for way in ("above", "below")] if powers else []
+    count = len(powers) + len(kinks)
+    some = count + len(lags) + (1 if follower else 0)
+
+    def error(x: Array, channel: int, values: Values) -> Array:
+        return _static_error(x, RESTS[channel], swing, powers, values[:count]) if powers else np.zeros_like(x)
 
     def outputs(
         given: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
     ) -> tuple[Array, Memory]:
         filters = [*(_line(t) for t in lags), *([_follow(*values[some:])] if follower else [])]
+        out, kept = given, memory
+        for channel in channels:
 
-        def shown(x: Array, kept: Memory) -> tuple[Array, Memory]:
-            late, kept = mixed(filters, x, period, values[count:some], kept)
-            return late + error(x, values), kept
+            def shown(x: Array, state: Memory, channel: int = channel) -> tuple[Array, Memory]:
+                late, state = mixed(filters, x, period, values[count:some], state)
+                return late + error(x, channel, values), state
 
-        return by_column(shown, given, channels, memory)
+            out, kept = by_column(shown, out, (channel,), kept)
+        return out, kept
 
     def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
         for channel in channels:  # the error is small: once is enough for a start
-            measured[:, channel] -= error(measured[:, channel], values)
+            measured[:, channel] -= error(measured[:, channel], channel, values)
         return measured
 
-    atoms = [Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers]
-    alone = tuple(k for k, power in enumerate(powers) if power > 1)  # a scale that is off does nothing like them
+    atoms = [
+        *(Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers),
+        *(Atom(f"scale {kink}", "1", 0.03, signed=True) for kink in kinks),
+    ]
+    alone = tuple(k for k in range(count) if k >= len(powers) or powers[k] > 1)  # a scale that is off does nothing so
     every_sign = name.startswith("anything")
     own = _shares([f"lag {t:g} s" for t in lags], every_sign)
     parameters = (*(amplitude(atom) for atom in atoms), *own, *follower)
@@ -213,12 +235,16 @@ def _follower(unit: str, slew: float, fastest: float) -> tuple[EffectParameter, 
 
 
 LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
+UNEVEN_NAMES = [f"slow {way} {t:g} s" for t in UNEVEN for way in ("opening", "closing")]
+ONE_WAY = [_follow(math.inf, *pair) for t in UNEVEN for pair in ((t, QUICK), (QUICK, t))]
 ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c in PLAYS)]
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
-           [*LAG_NAMES, DELAY_NAMES[0]], [*SLOW, LATE[0]], False, _follower("m2/s", 1.5e-6, 3e-5)),
+           [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
+           _follower("m2/s", 1.5e-6, 3e-5)),
+    _valve("transport_delay.shape", "commands that come late by any law: held, scattered", DELAY_NAMES, LATE, False),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
@@ -228,14 +254,14 @@ EFFECTS = (
            inputs=_exciter),
     _creeping("lvdt_offset.shape", DISPLACEMENTS, LVDT_CREEP, "m"),
     _creeping("pressure_offset.shape", PRESSURES_OR_BOTH, PRESSURE_CREEP, "Pa"),
-    _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, 0.0, LVDT_SWING,
-            (1, 2, 3), ()),
-    _sensor("pressure_scale.shape", "a sensitivity that is off, or not constant", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
-            PRESSURE_SWING, (0, 1, 2, 3), ()),
-    _sensor("pressure_lag.shape", "a late pressure sensor of any law", PRESSURES_OR_BOTH, PRESSURE_MIDDLE,
-            PRESSURE_SWING, (), SENSOR_LAGS, _follower("Pa/s", 5e5, 1e7)),
-    _sensor("anything.lvdt", "whatever the sensor does", DISPLACEMENTS, 0.0, LVDT_SWING, (0, 1, 2, 3),
+    _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, LVDT_SWING,
+            (0, 1, 2, 3), ()),
+    _sensor("pressure_scale.shape", "a sensitivity that is off, or not constant", PRESSURES_OR_BOTH, PRESSURE_SWING,
+            (0, 1, 2, 3), ()),
+    _sensor("pressure_lag.shape", "a late pressure sensor of any law", PRESSURES_OR_BOTH, PRESSURE_SWING,
+            (), SENSOR_LAGS, _follower("Pa/s", 5e5, 1e7)),
+    _sensor("anything.lvdt", "whatever the sensor does", DISPLACEMENTS, LVDT_SWING, (0, 1, 2, 3),
             SENSOR_LAGS[1:3]),
-    _sensor("anything.pressure", "whatever the sensor does", PRESSURES_OR_BOTH, PRESSURE_MIDDLE, PRESSURE_SWING,
+    _sensor("anything.pressure", "whatever the sensor does", PRESSURES_OR_BOTH, PRESSURE_SWING,
             (0, 1, 2, 3), SENSOR_LAGS),
 )  # fmt: skip

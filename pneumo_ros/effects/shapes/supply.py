@@ -60,4 +60,4 @@ def supply(z: State, p: Values) -> float:
 SUPPLY = Term(
     "supply", PlantTerm(states=8, start=start, advance=advance, supply=supply, shared=True), ATOMS, RIG, ("supply",)
 )
-EFFECTS = (SUPPLY.shape("supply_droop", ["droop"], "a supply that sags by any law"), SUPPLY.anything())
+EFFECTS = (SUPPLY.shape("supply_droop", ["droop", "offset"], "a supply that sags by any law"), SUPPLY.anything())
