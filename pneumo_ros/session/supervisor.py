@@ -26,6 +26,7 @@ from pneumo_ros.parameters import Value
 SUPERVISOR = "PNEUMO_SUPERVISOR"  # environment variable: process whose end ends the nodes as well
 PROGRESS = "PROGRESS "
 POLL = 0.02  # s
+FATAL = "Fatal Python error"  # begins what the interpreter prints of a crash: threads and modules follow
 LOGGED = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[")  # how rcl's logger begins a line
 STOP_PATIENCE = 5.0  # s a process has to end after SIGINT before it is killed
 RECORDER_PATIENCE = 60.0  # s; a slow disk may still be taking the log
@@ -83,10 +84,11 @@ class NodeProcess:
     said: list[str] = field(default_factory=list)
 
     def last_words(self) -> str:
-        """The last line it printed; what its logger says is of the way, not of the end."""
+        """The last line it printed, or the first of a crash's dump; what its logger says is of the way, not of the end."""
         lines = [line for line in self.said if line.strip() and not line.startswith(PROGRESS)]
         plain = [line for line in lines if not LOGGED.match(line)]
-        return plain[-1].strip() if plain else ""
+        fatal = [line for line in plain if line.startswith(FATAL)]
+        return (fatal[:1] or plain[-1:] or [""])[0].strip()
 
 
 def write_parameters(values: Mapping[str, Mapping[str, Value]], folder: Path) -> Path:
