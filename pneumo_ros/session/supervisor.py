@@ -84,7 +84,7 @@ class NodeProcess:
     said: list[str] = field(default_factory=list)
 
     def last_words(self) -> str:
-        """The last line it printed, or the first of a crash's dump; what its logger says is of the way, not of the end."""
+        """Its last line, or the first of a crash's dump; what its logger says is of the way, not of the end."""
         lines = [line for line in self.said if line.strip() and not line.startswith(PROGRESS)]
         plain = [line for line in lines if not LOGGED.match(line)]
         fatal = [line for line in plain if line.startswith(FATAL)]
