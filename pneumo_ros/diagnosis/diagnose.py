@@ -201,7 +201,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         experiment = _next_experiment(outcome, opinion, group, options.experiment)
     refused = () if experiment is None or experiment.tells else (experiment.refusal,)
     cov = covariance(problem, best)
-    shares = budgeted(outcome, opinion, cov)
+    shares = budgeted(outcome, opinion)
     tell(1.0, "done")
     hidden = _hidden(problem, search)
     blind = opinion.verdict == "none" and len(hidden) > MOSTLY * len(problem.model.effects)

@@ -13,7 +13,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.judge.held_out import total_floor
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
-from pneumo_ros.diagnosis.search.growth import with_parts
+from pneumo_ros.diagnosis.search.parts import with_parts
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.own_rig.model import OwnRig
 from pneumo_ros.own_rig.records import OwnRecord

@@ -21,25 +21,31 @@ TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
 # Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
 # [taste]
 LAW: Final = 0.015
+UNUSED: Final = 1e-3  # of a typical size: none [numerics]
 NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by [numerics]
 
 
-def covariance(problem: Problem, fit: Fit) -> Array:
+def covariance(problem: Problem, fit: Fit, absent: bool = False) -> Array:
     """Covariance of the scaled unknowns: curvature of the data over the residual's own size and correlation, and prior.
 
-    An unknown at its bound does not vary. Sensitivities are true to :data:`TRUE_TO` of themselves: a direction that
-    moves the outputs by less than that tells nothing, and only the prior holds it.
+    An unknown at its bound does not vary; with ``absent`` sizes do that ended at none: for a curve, whose atoms might
+    as well be there. Sensitivities are true to :data:`TRUE_TO` of themselves: a direction that moves the outputs by
+    less than that tells nothing, and only the prior holds it.
     """
     assert fit.jacobian is not None
     free = _free(problem, fit)
+    prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)
+    if absent:
+        sizes = [False] * problem.fixed + [p.size for p in problem.effect_parameters(fit.candidate)]
+        free = free | (np.array(sizes) & (np.abs(fit.x) < UNUSED))
+        prior = np.maximum(problem.prior(fit.candidate), 1e-9)
     J = fit.jacobian[:, :, free].reshape(fit.residual.size, int(free.sum()))
-    prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)[free]
     strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
     size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
     values, vectors = np.linalg.eigh((J / size).T @ (J / size))
     known = (vectors * np.maximum(values - len(size) * TRUE_TO**2, 0.0)) @ vectors.T * np.outer(size, size)
     out = np.zeros((len(fit.x), len(fit.x)))
-    out[np.ix_(free, free)] = np.linalg.inv(strength * known + np.diag(prior))
+    out[np.ix_(free, free)] = np.linalg.inv(strength * known + np.diag(prior[free]))
     return out
 
 
@@ -120,7 +126,8 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     sizes, and of those that only bend a shape.
 
     A size counts whole: nothing of the kind is so large. What only shapes a law counts half, another law may bend it;
-    and so does a law's size beside its family's shape, which can do the same and may push it anywhere.
+    and so does a law's size beside its family's shape, which can do the same and may push it anywhere. What shapes a
+    law beside that does not count: nothing is asked of it that the shape cannot do.
     """
     free, values = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x)
     first, firm, bent = 0, 0.0, 0.0
@@ -132,7 +139,7 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
             continue
         law, sizes = is_law(part[0]), sum(p.size for p in stuck)
         beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-        firm += sizes * (0.5 if beside else 1.0) + (0.5 * (len(stuck) - sizes) if law else 0.0)
+        firm += sizes * (0.5 if beside else 1.0) + (0.5 * (len(stuck) - sizes) if law and not beside else 0.0)
         bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
     return firm, bent
 

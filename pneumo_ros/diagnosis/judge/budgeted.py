@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry, Remainder
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.effects.parameters import ANYTHING, Active, Curve, family_of
 
+NINETY: Final = 1.645  # standard deviations of half a 90 % band [definition]
+
 
 @dataclass(frozen=True)
 class Shares:
@@ -33,9 +36,10 @@ class Shares:
     floor: float
 
 
-def budgeted(outcome: Outcome, opinion: Opinion, cov: Array) -> Shares:
-    """Shares of the best structure; ``cov`` of its scaled unknowns."""
+def budgeted(outcome: Outcome, opinion: Opinion) -> Shares:
+    """Shares of the best structure."""
     best, found = outcome.best, outcome.budget
+    cov = covariance(outcome.problem, best, absent=True)
     entries = [_entry(outcome, opinion, found, law, cov) for law in best.candidate.laws]
     ranked = tuple(sorted(entries, key=lambda e: -e.share))
     return Shares(ranked, found.refit, _remainder(outcome, found), found.floor)
@@ -47,14 +51,27 @@ def _entry(outcome: Outcome, opinion: Opinion, found: Budget, law: Part, cov: Ar
     where = problem.model.places(Active(*law, ()))
     share = found.effects[law]
     name = DIFFERS if len(parts) > 1 else law[0]
-    curve = measured_curve(problem, best, outcome.holdout, parts, cov)
+    known = next((e for e in outcome.closable.effects if e.law == law), None)
+    form = 1.0 if known is None else left_by_form(known.own, known.without)
+    curve = measured_curve(problem, best, outcome.holdout, parts, cov, form)
     side = problem.model.side(Active(*law, ()))
     return BudgetEntry((family_of(law[0]),), side, where, share.value, share.ci90, name,
                        float(opinion.effects.get(law, 0.0)), curve)  # fmt: skip
 
 
-def measured_curve(problem: Problem, one: Fit, record: object, parts: Sequence[Part], cov: Array) -> Curve | None:
-    """Curve of an effect's parts in a fitted structure with the band that the covariance of its scaled unknowns gives.
+def left_by_form(left: float, whole: float) -> float:
+    """Share, rms, of what an effect makes of the gap that its own law may be wrong by: all that is left may be its own.
+
+    ``left`` and ``whole`` : mean squares of the held-out gap with and without the effect
+    """
+    return float(np.sqrt(np.clip(left / max(whole, 1e-12), 0.0, 1.0)))
+
+
+def measured_curve(
+    problem: Problem, one: Fit, record: object, parts: Sequence[Part], cov: Array, form: float
+) -> Curve | None:
+    """Curve of an effect's parts in a fitted structure with its 90 % band: what the covariance of its scaled unknowns
+    gives, and ``form`` of the curve's own rms, because what is left may be this law's.
 
     Of whatever may act at several places that of the first: a force and a flow have no curve together.
     """
@@ -74,8 +91,16 @@ def measured_curve(problem: Problem, one: Fit, record: object, parts: Sequence[P
             columns += range(first, first + len(acting.values))
         first += len(acting.values)
     size = scale[np.array(columns) - problem.fixed]
-    return model.curve(
-        record, problem.nuisance(one.x), active, own, cov[np.ix_(columns, columns)] * np.outer(size, size)
+    known = cov[np.ix_(columns, columns)] * np.outer(size, size)
+    found = model.curve(record, problem.nuisance(one.x), active, own, known)
+    return None if found is None else _widened(found, form)
+
+
+def _widened(curve: Curve, form: float) -> Curve:
+    x, y, low, high, weight = np.asarray(curve.points).T
+    more = NINETY * form * float(np.sqrt(np.sum(weight * y * y) / max(float(np.sum(weight)), 1e-12)))
+    return replace(
+        curve, points=np.column_stack([x, y, y - np.hypot(y - low, more), y + np.hypot(high - y, more), weight])
     )
 
 
@@ -87,7 +112,8 @@ def _remainder(outcome: Outcome, found: Budget) -> Remainder | None:
         return Remainder(found.remainder)
     problem = outcome.problem
     fitted = sensitivities(problem, closing.fit)
-    curve = measured_curve(problem, fitted, outcome.holdout, closing.parts, covariance(problem, fitted))
+    cov, form = covariance(problem, fitted, absent=True), left_by_form(closing.gap, outcome.closable.own)
+    curve = measured_curve(problem, fitted, outcome.holdout, closing.parts, cov, form)
     return Remainder(found.remainder, closing.places, curve)
 
 

@@ -20,7 +20,7 @@ from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.fitting import of_law
-from pneumo_ros.diagnosis.search.growth import reduced, with_parts
+from pneumo_ros.diagnosis.search.parts import reduced, with_parts
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ranking of a diagnosis: every structure that was fitted to the end, with what speaks for and against it."""
+"""The ranking of a diagnosis: the likeliest structures that were fitted to the end, with what speaks for them."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.result import Ranked
-from pneumo_ros.diagnosis.search.selection import Scored
+from pneumo_ros.diagnosis.search.selection import Scored, log_weight
 from pneumo_ros.effects.parameters import Active, family_of
+
+TOLD: Final = 10  # finalists in the ranking: each costs a run of the held-out log and its sensitivities [taste]
 
 
 def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
-    """Nominal structure, unknown, and every finalist; the most probable first."""
+    """Nominal structure, unknown, and the likeliest finalists; the most probable first."""
     problem, holdout, base, best = outcome.problem, outcome.holdout, outcome.base, outcome.best
     refit = outcome.runs["refit"]
     fitted = problem.gap(base.residual)
@@ -30,7 +32,8 @@ def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
     out = [replace(nominal, evidence=_weighed(outcome.refit))]
     if opinion.unknown > 1e-3:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
-    for scored in outcome.finalists:
+    by_weight = sorted(outcome.finalists, key=lambda one: -log_weight(one, outcome.refit))
+    for scored in sorted(by_weight, key=lambda one: -opinion.named[one.fit.candidate])[:TOLD]:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else refreshed(problem, scored.fit)
         run = outcome.runs["best"] if same else held_by(problem, one, holdout)

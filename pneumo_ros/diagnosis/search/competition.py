@@ -30,6 +30,7 @@ from pneumo_ros.diagnosis.search.fitting import (
     short_fits,
     varied,
 )
+from pneumo_ros.diagnosis.search.parts import rival, with_shapes
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
@@ -38,14 +39,16 @@ from pneumo_ros.diagnosis.search.screening import (
     trials,
     visibility,
 )
-from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level, score
+from pneumo_ros.diagnosis.search.selection import ALIKE, FORM, LAW_SHARE, Thresholds, noise_level, score
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
+from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.errors import InputError
 
 # Shares of the nominal model's misfit outside which another fold is kept from the fit [taste]
 LOPSIDED: Final = (0.1, 0.6)
 # Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
 NOT_EVIDENT: Final = 0.9
+SHAPED: Final = 3  # leading singles that are fitted with their shapes [numerics]
 STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 
 
@@ -63,7 +66,11 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     _time_jumps(search)
     _run_singles(search)
     _time_jumps(search)
-    if pairs and search.singles and room_for_more(search):
+    search.progress(0.55, "shapes")
+    search.structures = [
+        with_shapes(search.problem, one) for one in (*search.singles[:SHAPED], *_rivals_of_first(search))
+    ]
+    if pairs and search.singles and room_for_more(search) and not _as_laws_leave(search):
         _run_pairs(search)
         _time_jumps(search)
     return search
@@ -96,6 +103,31 @@ def room_for_more(search: Search) -> bool:
     return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
 
 
+def _as_laws_leave(search: Search) -> bool:
+    """Whether a single with its family's shape leaves no more than laws of the right kind do: what a second effect may
+    add to it is found beside it, and no pairs are looked for.
+    """
+    problem = search.problem
+    enough = ALIKE + LAW_SHARE**2 * score(problem, search.refit).level
+    return min((score(problem, one).level for one in search.finalists), default=np.inf) < enough
+
+
+def _rivals_of_first(search: Search) -> list[Fit]:
+    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says
+    little of what they leave by another.
+    """
+    problem, found = search.problem, search.singles
+    if not found:
+        return []
+    taken = {family_of(law[0]) for one in found[:SHAPED] for law in one.candidate.laws}
+    rivals: dict[str, Fit] = {}
+    for one in found[SHAPED:]:
+        (law,) = one.candidate.laws
+        if family_of(law[0]) not in taken and rival(problem, found[0].candidate.laws[0], law):
+            rivals.setdefault(family_of(law[0]), one)
+    return list(rivals.values())
+
+
 def _time_jumps(search: Search) -> None:
     """Time the command's jumps by the best fit so far; when that helps, fit all finalists again."""
     moved = timed(search.logged, search.problem, search.best)
@@ -108,6 +140,9 @@ def _time_jumps(search: Search) -> None:
     done = len(search.singles[:singles])
     search.singles = by_cost(again[:done]) + search.singles[singles:]
     search.pairs = by_cost(again[done:]) + search.pairs[pairs:]
+    search.structures = [
+        fit(moved, f.candidate, f.x, f.jacobian, iterations=search.effort.short) for f in search.structures
+    ]
 
 
 def _run_singles(search: Search) -> None:

@@ -13,20 +13,17 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.arrays import Mask
-from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
-from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.competition import room_for_more
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, restricted, short_fits, varied
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
+from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
 from pneumo_ros.diagnosis.search.state import Search
-from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
-SHAPED: Final = (3, 2)  # leading singles and pairs that are fitted with their shapes [numerics]
-SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
+SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
 COUNTS: Final = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
 EXCHANGED: Final = (6, 3)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
@@ -35,15 +32,13 @@ MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 # Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
 STEP: Final = 0.3
 EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
-STEPS: Final = 5  # iterations of a fit without some parts [numerics]
 IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without being missed [taste]
 
 
 def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
-    """Fill ``search.structures``: leading singles and pairs with their shapes, and what grows from the best."""
+    """Add to ``search.structures``: leading pairs with their shapes, and what grows from the best."""
     search.progress(0.82, "shapes")
-    leading = [*search.singles[: SHAPED[0]], *_rivals_of_first(search), *search.pairs[: SHAPED[1]]]
-    search.structures += [with_shapes(search.problem, one) for one in leading]
+    search.structures += [with_shapes(search.problem, one) for one in search.pairs[:SHAPED]]
     best = _selected(search, limits)
     if further and best.size and room_for_more(search):
         _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
@@ -53,22 +48,6 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
-
-
-def _rivals_of_first(search: Search) -> list[Fit]:
-    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says
-    little of what they leave by another.
-    """
-    problem, found = search.problem, search.singles
-    if not found:
-        return []
-    taken = {family_of(law[0]) for one in found[: SHAPED[0]] for law in one.candidate.laws}
-    rivals: dict[str, Fit] = {}
-    for one in found[SHAPED[0] :]:
-        (law,) = one.candidate.laws
-        if family_of(law[0]) not in taken and _rival(problem, found[0].candidate.laws[0], law):
-            rivals.setdefault(family_of(law[0]), one)
-    return list(rivals.values())
 
 
 def _climb(search: Search, start: Scored, evident: float) -> None:
@@ -138,53 +117,6 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
     return min(ended, key=lambda one: score(problem, one).price, default=None)
 
 
-def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
-    """A structure's laws with the shapes of their families beside them; the fit itself where they have none."""
-    missing = tuple(p for p in shapes_of(problem.model, one.candidate) if p not in one.candidate.parts)
-    if not missing:
-        return one
-    return with_parts(problem, one, missing, iterations)
-
-
-def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
-    """Shapes of the families of a structure, where its laws act."""
-    named = ((f"{family_of(effect)}.{SHAPE}", site) for effect, site in candidate.laws)
-    return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
-
-
-def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
-    """A structure with further parts, which start at nothing."""
-    candidate = Candidate((*one.candidate.parts, *parts))
-    values = [*problem.values(one.candidate, one.x), *_beginnings(problem, one, parts)]
-    start = problem.start(candidate, one.x[: problem.fixed], values)
-    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
-    return found if found.cost < one.cost else one
-
-
-def _beginnings(problem: Problem, one: Fit, parts: Sequence[Part]) -> list[float]:
-    """Values of parts that do nothing yet: sizes zero, and whatever a law of the same family has found by that name."""
-    own = iter(problem.values(one.candidate, one.x).tolist())
-    found = {
-        (family_of(part[0]), part[1], p.name): next(own)
-        for part in one.candidate.parts
-        for p in problem.effect_parameters(Candidate((part,)))
-    }
-    return [
-        0.0 if p.size else found.get((family_of(part[0]), part[1], p.name), p.typical)
-        for part in parts
-        for p in problem.effect_parameters(Candidate((part,)))
-    ]
-
-
-def reduced(
-    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS, rows: Mask | None = None
-) -> Fit:
-    """A structure without some of its parts, fitted from what is left of it."""
-    kept = tuple(part for part in one.candidate.parts if part not in parts)
-    candidate = Candidate(kept)
-    return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
-
-
 def _selected(search: Search, limits: Thresholds) -> Scored:
     problem = search.problem
     return select(score(problem, search.refit), [score(problem, f) for f in search.finalists], limits)
@@ -231,7 +163,7 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
     problem, effort = search.problem, search.effort
     bare = refreshed(problem, bare)
-    rivals = [part for part in _compatible(problem, bare.candidate.laws) if _rival(problem, law, part)]
+    rivals = [part for part in _compatible(problem, bare.candidate.laws) if rival(problem, law, part)]
     screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
     for short in short_fits(search, bare, probed(problem, bare, screened)[:1], (0.9, 0.9)):
         other = with_shapes(problem, short)
@@ -239,14 +171,6 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
         if score(problem, other).price < score(problem, found).price:
             return other
     return found
-
-
-def _rival(problem: Problem, law: Part, other: Part) -> bool:
-    """Whether two effects of unlike families act at one site and are blamed on the same place."""
-    if family_of(law[0]) == family_of(other[0]) or law[1] != other[1]:
-        return False
-    one, two = (problem.model.places(Active(*p, ())) for p in (law, other))
-    return one[:1] == two[:1]
 
 
 def _without_idle_shapes(search: Search, found: Fit) -> Fit:

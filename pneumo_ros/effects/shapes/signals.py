@@ -50,6 +50,7 @@ QUICK = 0.001  # s
 SHARE = 0.3
 RESTS = (0.0291, 0.0207, -0.0166, -0.0250, 2.77e5, 4.29e5)  # m, Pa absolute: CHANNELS of the nominal rig at rest
 PRESSURE_SWING, LVDT_SWING = 5e4, 0.01  # Pa, m: of a session
+KINKED = "scale above 0"
 KINKS = (0.0, 1.0)  # swings from the rest beyond which a sensor may have another sensitivity
 CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
 CREEPS_TRIED = (1, 3)  # which of them are tried alone
@@ -200,7 +201,8 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], swing: float, power
         *(Atom(f"error of power {power}", "1", 0.03, signed=True) for power in powers),
         *(Atom(f"scale {kink}", "1", 0.03, signed=True) for kink in kinks),
     ]
-    alone = tuple(k for k in range(count) if k >= len(powers) or powers[k] > 1)  # a scale that is off does nothing so
+    # A scale that is off does nothing like them; a kink on the other side is one with another scale.
+    alone = tuple(k for k, atom in enumerate(atoms) if atom.name in ("error of power 2", "error of power 3", KINKED))
     every_sign = name.startswith("anything")
     own = _shares([f"lag {t:g} s" for t in lags], every_sign)
     parameters = (*(amplitude(atom) for atom in atoms), *own, *follower)

@@ -59,7 +59,7 @@ EFFECTS = (
         "tyre_liftoff",
         ["lift", "progressive", "constant"],
         "a tyre that stops pulling, of any law: its force is convex over the compression",
-        alone=("lift", "progressive"),
+        alone=("lift below 5 %", "lift below 35 %", "progressive"),
     ),
     TYRE.anything(),
 )

@@ -28,8 +28,8 @@ def test_what_acts_at_several_places_is_shown_at_the_first(first: int) -> None:
     start = problem.start(candidate, None, _small(problem, candidate))
     found = sensitivities(problem, fit(problem, candidate, start, iterations=1))
     cov = covariance(problem, found)
-    together = measured_curve(problem, found, record, parts, cov)
-    alone = measured_curve(problem, found, record, parts[:1], cov)
+    together = measured_curve(problem, found, record, parts, cov, 0.0)
+    alone = measured_curve(problem, found, record, parts[:1], cov, 0.0)
     assert together is not None and alone is not None and (together.x, together.y) == (alone.x, alone.y)
     np.testing.assert_array_equal(together.points, alone.points)
 

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A structure with further parts or without some: its families' shapes, an effect less, whatever may act somewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from pneumo_ros.arrays import Mask
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.search.fitting import restricted
+from pneumo_ros.effects.parameters import SHAPE, Active, family_of
+
+SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
+STEPS: Final = 5  # iterations of a fit without some parts [numerics]
+
+
+def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
+    """A structure's laws with the shapes of their families beside them; the fit itself where they have none."""
+    missing = tuple(p for p in shapes_of(problem.model, one.candidate) if p not in one.candidate.parts)
+    if not missing:
+        return one
+    return with_parts(problem, one, missing, iterations)
+
+
+def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
+    """Shapes of the families of a structure, where its laws act."""
+    named = ((f"{family_of(effect)}.{SHAPE}", site) for effect, site in candidate.laws)
+    return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
+
+
+def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
+    """A structure with further parts, which start at nothing."""
+    candidate = Candidate((*one.candidate.parts, *parts))
+    values = [*problem.values(one.candidate, one.x), *_beginnings(problem, one, parts)]
+    start = problem.start(candidate, one.x[: problem.fixed], values)
+    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
+    return found if found.cost < one.cost else one
+
+
+def _beginnings(problem: Problem, one: Fit, parts: Sequence[Part]) -> list[float]:
+    """Values of parts that do nothing yet: sizes zero, and whatever a law of the same family has found by that name."""
+    own = iter(problem.values(one.candidate, one.x).tolist())
+    found = {
+        (family_of(part[0]), part[1], p.name): next(own)
+        for part in one.candidate.parts
+        for p in problem.effect_parameters(Candidate((part,)))
+    }
+    return [
+        0.0 if p.size else found.get((family_of(part[0]), part[1], p.name), p.typical)
+        for part in parts
+        for p in problem.effect_parameters(Candidate((part,)))
+    ]
+
+
+def reduced(
+    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS, rows: Mask | None = None
+) -> Fit:
+    """A structure without some of its parts, fitted from what is left of it."""
+    kept = tuple(part for part in one.candidate.parts if part not in parts)
+    candidate = Candidate(kept)
+    return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
+
+
+def rival(problem: Problem, law: Part, other: Part) -> bool:
+    """Whether two effects of unlike families act at one site and are blamed on the same place."""
+    if family_of(law[0]) == family_of(other[0]) or law[1] != other[1]:
+        return False
+    one, two = (problem.model.places(Active(*p, ())) for p in (law, other))
+    return one[:1] == two[:1]
