@@ -193,7 +193,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
     problem, search, holdout, best = outcome.problem, outcome.search, outcome.holdout, outcome.best
     tell(0.95, "ranking")
     ranking = rank(outcome, opinion)
-    group = ambiguity_group(problem, opinion, outcome.finalists)
+    group = ambiguity_group(problem, opinion, outcome.refit, outcome.finalists)
     location = _location(outcome, opinion)
     experiment = None
     if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:

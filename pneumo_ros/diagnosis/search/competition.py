@@ -49,6 +49,7 @@ LOPSIDED: Final = (0.1, 0.6)
 # Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
 NOT_EVIDENT: Final = 0.9
 SHAPED: Final = 3  # leading singles that are fitted with their shapes [numerics]
+RIVALS: Final = 3  # other families at the leading single's place that are fitted with their shapes [numerics]
 STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 
 
@@ -67,9 +68,8 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     _run_singles(search)
     _time_jumps(search)
     search.progress(0.55, "shapes")
-    search.structures = [
-        with_shapes(search.problem, one) for one in (*search.singles[:SHAPED], *_rivals_of_first(search))
-    ]
+    leading = [with_shapes(search.problem, one) for one in search.singles[:SHAPED]]
+    search.structures = [*leading, *_rivals_of_first(search)]
     if pairs and search.singles and room_for_more(search) and not _as_laws_leave(search):
         _run_pairs(search)
         _time_jumps(search)
@@ -113,19 +113,22 @@ def _as_laws_leave(search: Search) -> bool:
 
 
 def _rivals_of_first(search: Search) -> list[Fit]:
-    """Singles of other families at the place of the leading one, the best of each: what they leave by one law says
-    little of what they leave by another.
+    """Other families at the place of the leading single with their shapes, those that the screening thinks most of.
+
+    What a family leaves by the library's law says little of what it leaves by another.
     """
     problem, found = search.problem, search.singles
     if not found:
         return []
+    leader = found[0].candidate.laws[0]
     taken = {family_of(law[0]) for one in found[:SHAPED] for law in one.candidate.laws}
-    rivals: dict[str, Fit] = {}
-    for one in found[SHAPED:]:
-        (law,) = one.candidate.laws
-        if family_of(law[0]) not in taken and rival(problem, found[0].candidate.laws[0], law):
-            rivals.setdefault(family_of(law[0]), one)
-    return list(rivals.values())
+    rivals: dict[str, CandidateScore] = {}
+    for entry in search.screened:
+        law = entry.parts[0]
+        if family_of(law[0]) not in taken and rival(problem, leader, law):
+            rivals.setdefault(family_of(law[0]), entry)
+    short = short_fits(search, search.refit, list(rivals.values())[:RIVALS], (0.56, 0.58))
+    return [with_shapes(problem, one, search.effort.long) for one in short]
 
 
 def _time_jumps(search: Search) -> None:

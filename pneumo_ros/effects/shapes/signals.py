@@ -246,7 +246,7 @@ EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
            [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
            _follower("m2/s", 1.5e-6, 3e-5)),
-    _valve("transport_delay.shape", "commands that come late by any law: held, scattered", DELAY_NAMES, LATE, False),
+    _valve("transport_delay.shape", "commands that come late by delays of many lengths", DELAY_NAMES, LATE, False),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),

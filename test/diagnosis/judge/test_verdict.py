@@ -10,7 +10,7 @@ import pytest
 
 from pneumo_ros.diagnosis.fit.problem import Candidate
 from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
+from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group, as_good
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge
 from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, select
@@ -22,7 +22,7 @@ LIMITS = Thresholds()
 def scored(level: float, cost: float, *effects: str, unknowns: int = 30, site: str = "front") -> Scored:
     candidate = Candidate(tuple((name, site) for name in effects))
     blocks = level * np.array([0.9, 1.0, 1.1, 1.0])
-    return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0)
+    return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0, fitted=level)
 
 
 def evidence(
@@ -59,6 +59,25 @@ def test_two_names_that_fit_alike_share_the_probability() -> None:
     rivals = scored(0.16, -1150.0, "valve_lag", unknowns=32), scored(0.16, -1146.0, "transport_delay", unknowns=31)
     found = opinion(scored(17.0, 1200.0), *rivals, held=HeldOutGaps(8.0, 1.1))
     assert {found.verdict} <= {"valve_lag", "transport_delay"} and 0.5 < found.probability < 0.8
+
+
+def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() -> None:
+    """A leak of another law and an orifice with six unknowns more both close all but a thousandth of the misfit."""
+    refit, leak = scored(550.0, 3450.0), scored(0.39, -392.0, "leak", unknowns=32)
+    orifice = scored(0.235, -740.0, "orifice_coefficient", unknowns=38)
+    found = opinion(refit, orifice, leak, held=HeldOutGaps(20.0, 1.4))
+    assert found.verdict == "leak" and found.of("orifice_coefficient") > 0.01
+    far = opinion(refit, orifice, scored(9.0, 1360.0, "leak", unknowns=32), held=HeldOutGaps(20.0, 1.4))
+    assert far.verdict == "orifice_coefficient" and far.of("leak") < 1e-3
+
+
+@pytest.mark.parametrize(("beside", "named"), [(0.6, True), (0.05, False)])
+def test_a_name_that_nobody_misses_beside_the_rest_is_none(beside: float, named: bool) -> None:
+    """A tyre that seemed to lift did the work of a strap at the strut."""
+    refit, chosen = scored(400.0, 3000.0), scored(90.0, 1500.0, "tyre_liftoff", unknowns=34)
+    (one,) = evidence(chosen, 1.0, 0.8, 0.75)
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 16.0), [replace(one, beside=beside)])
+    assert (told.verdict == "tyre_liftoff") is named
 
 
 def test_a_family_that_closes_what_can_be_closed_is_named_however_much_is_left() -> None:
@@ -172,12 +191,20 @@ def test_the_group_holds_what_is_not_excluded() -> None:
 
     def group(verdict: str, named: dict[tuple[str, ...], float]) -> tuple[str, ...]:
         candidates = {scored(1.0, 0.0, *names).fit.candidate: p for names, p in named.items()}
-        return ambiguity_group(None, Opinion(chosen, verdict, candidates, 0.5), [])  # type: ignore[arg-type]
+        return ambiguity_group(None, Opinion(chosen, verdict, candidates, 0.5), chosen, [])  # type: ignore[arg-type]
 
     assert group("none", {(): 0.7, ("leak",): 0.1, ("dead_volume",): 0.16, ("payload",): 0.04}) == (
         "dead_volume", "leak")  # fmt: skip
     assert group("unknown", {("leak", "payload"): 0.2, ("leak",): 0.3}) == ("leak", "leak+payload")
     assert group("leak", {(): 0.02, ("leak",): 0.9, ("heat_transfer",): 0.08}) == ("leak", "heat_transfer")
+
+
+def test_a_rival_that_leaves_what_another_law_might_is_in_the_group() -> None:
+    refit, chosen = scored(550.0, 3450.0), scored(0.24, -740.0, "leak")
+    assert as_good(refit, chosen, scored(0.5, -300.0, "orifice_coefficient"))
+    assert not as_good(refit, chosen, scored(3.0, 700.0, "orifice_coefficient"))
+    small, tiny = scored(0.43, -480.0), scored(0.3, -600.0, "leak")
+    assert not as_good(small, tiny, scored(0.41, -500.0, "heat_transfer")), "of a small gap it must close most as well"
 
 
 def test_both_ends_are_claimed_only_where_both_were_seen() -> None:

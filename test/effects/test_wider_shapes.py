@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shapes hold the laws that rigs of other makers have: fitted without noise by sums of their atoms, signs kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from pneumo_ros.effects.contract import Effect, Ends, Inputs
+from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.effects.shapes import tyre as tyres
+from pneumo_ros.effects.shapes.families import SHAPES
+from pneumo_ros.effects.shapes.signals import RESTS
+from pneumo_ros.rig import load_rig
+
+PERIOD = 2e-3  # s
+REST, STIFFNESS = 0.0166, 14000.0  # m, N/m: the front tyre of the nominal rig
+
+
+def left_of(atoms: np.ndarray, signed: list[bool], law: np.ndarray, free: np.ndarray) -> float:
+    """Share, rms, of a law that a shape's atoms cannot make; ``free`` is what the tolerances answer, of either sign."""
+    table = np.column_stack([atoms, free])
+    table = table / np.maximum(np.linalg.norm(table, axis=0), 1e-12)
+    low = [-np.inf if either else 0.0 for either in [*signed, *[True] * free.shape[1]]]
+    found = lsq_linear(table, law, bounds=(low, np.inf))
+    return float(np.linalg.norm(table @ found.x - law) / np.linalg.norm(law))
+
+
+def signs(effect: Effect) -> list[bool]:
+    return [p.low < 0.0 for p in effect.parameters]
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda r: np.maximum(r, 0.0) ** 1.1,
+        lambda r: (r + np.sqrt(r * r + 0.16)) / (1.0 + np.sqrt(1.16)),
+        lambda r: np.maximum(r, 0.0),
+    ],
+    ids=["progressive", "lets go smoothly", "hard end"],
+)
+def test_a_tyre_that_only_pushes_is_a_lift_off_of_some_law(law: object) -> None:
+    compression = np.linspace(-0.5 * REST, 2.2 * REST, 200)
+    shape = SHAPES["tyre_liftoff.shape"]
+    extra = STIFFNESS * (REST * law(compression / REST) - compression)  # type: ignore[operator]
+    atoms = []
+    for column in shape.columns:
+        p = tuple(float(k == column) for k in range(len(tyres.ATOMS)))
+        seen = (Tyre(float(c), 0.0, STIFFNESS * float(c), 0.0, 0.0, REST) for c in compression)
+        atoms.append([tyres.tyre(one, (0.0, 0.0), p) for one in seen])
+    stiffer = compression[:, None]  # within its tolerance
+    assert left_of(np.array(atoms).T, signs(shape), extra, stiffer) < 0.05
+
+
+def test_friction_that_saturates_late_and_a_damper_that_opens_early_are_the_same_curve() -> None:
+    """Between 12 and 40 mm/s either may be called: what is left tells nothing, the curve does."""
+    from pneumo_ros.effects.shapes.force import ATOMS, force
+
+    rate = np.linspace(-0.3, 0.3, 301)
+    law = -np.clip(rate / 0.03, -1.0, 1.0)
+    for family in ("coulomb_friction", "viscous_damping"):
+        shape = SHAPES[f"{family}.shape"]
+        atoms = []
+        for column in shape.columns:
+            p = tuple(float(k == column) for k in range(len(ATOMS)))
+            seen = (Strut(0.0457, float(v), 2.5e5, 1.6e-3, 0.0, 0.0, 0.0) for v in rate)
+            atoms.append([force(one, (0.0,) * 8, p) for one in seen])
+        assert left_of(np.array(atoms).T, signs(shape), law, rate[:, None]) < 0.1, family
+
+
+@pytest.mark.parametrize("channel", [0, 3, 4])
+def test_a_sensor_with_another_sensitivity_on_one_side_of_its_rest(channel: int) -> None:
+    name = "pressure_scale.shape" if channel > 3 else "lvdt_scale.shape"
+    shape, swing = SHAPES[name], 5e4 if channel > 3 else 0.01
+    reading = np.zeros((101, 6))
+    reading[:, channel] = RESTS[channel] + swing * np.linspace(-1.5, 1.5, 101)
+    values = tuple(0.2 if p.name == "scale above 0" else 0.0 for p in shape.parameters)
+    assert shape.outputs is not None
+    shown, _ = shape.outputs(reading, PERIOD, (channel,), values, None)
+    error = shown[:, channel] - reading[:, channel]
+    assert np.allclose(error, 0.2 * np.maximum(reading[:, channel] - RESTS[channel], 0.0), atol=1e-9 * swing)
+
+
+def test_a_valve_that_opens_slowly_and_closes_at_once() -> None:
+    shape = SHAPES["valve_lag.shape"]
+    opened = np.r_[np.zeros(50), np.full(200, 1e-6), np.zeros(200)]
+    values = [p.typical if not p.size else float(p.name == "slow opening 0.03 s") for p in shape.parameters]
+    given = Inputs(np.tile(opened[:, None], (1, 4)), np.zeros((451, 2)))
+    assert shape.inputs is not None
+    after, _ = shape.inputs(given, PERIOD, Ends(True, False), tuple(values), None)
+    valve, time = after.commands[:, 0], PERIOD * np.arange(1, 51)
+    assert np.allclose(valve[50:100], 1e-6 * (1.0 - np.exp(-time / 0.03)), rtol=1e-6)
+    assert np.all(valve[260:] < 1e-9) and np.array_equal(after.commands[:, 1], opened)
+
+
+def test_commands_that_come_late_by_two_delays() -> None:
+    shape = SHAPES["transport_delay.shape"]
+    step = np.r_[np.zeros(100), np.ones(100)]
+    values = tuple({"delay 0.008 s": 0.25, "delay 0.032 s": 0.75}.get(p.name, 0.0) for p in shape.parameters)
+    given = Inputs(np.tile(step[:, None], (1, 4)), np.zeros((201, 2)))
+    assert shape.inputs is not None
+    late = shape.inputs(given, PERIOD, Ends(True, False), values, None)[0].commands[:, 0]
+    assert np.allclose(late[100:104], 0.0) and np.allclose(late[104:116], 0.25) and np.allclose(late[116:], 1.0)
+
+
+def test_a_load_brings_its_inertia_and_a_shift() -> None:
+    model = RigModel(load_rig())
+    nominal = model.plant(model_centre(model), ()).body
+    shape = SHAPES["payload.shape"]
+    assert shape.plant is not None
+    changed = shape.plant(model.plant(model_centre(model), ()), Ends(True, True), (0.3, 0.01)).body
+    assert changed.pitch_inertia == pytest.approx(nominal.pitch_inertia + 0.3)
+    assert changed.front_arm + changed.rear_arm == pytest.approx(nominal.front_arm + nominal.rear_arm)
+    assert nominal.front_arm - changed.front_arm == pytest.approx(0.01)
+
+
+def model_centre(model: RigModel) -> np.ndarray:
+    return np.array([p.nominal for p in model.parameters])
