@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,6 @@ class Problem:
     own_average: int | None = None
     fold: int = SELECT_EVERY - 1
     threads: int = 1
-    _scratch: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
         """``work`` done on each item, in their order, several at a time."""
