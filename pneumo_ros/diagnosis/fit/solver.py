@@ -129,12 +129,13 @@ def fit(
     shared = problem.fixed if shared is None else shared
     borrowed = None if jacobian is None else jacobian[:, :, :shared]
     columns: Array | None = None  # None: to be taken anew
+    stale: Array | None = None  # of an earlier step
     damping, failed = START_DAMPING, False
     for _ in range(iterations):
         anew = columns is None
         if columns is None:
-            columns = _jacobian(problem, state, borrowed)
-            state = replace(state, simulations=state.simulations + _spent(columns, borrowed))
+            columns, spent = _jacobian(problem, state, borrowed, stale)
+            state = replace(state, simulations=state.simulations + spent)
         state = replace(state, jacobian=columns)
         better, damping, predicted = _step(problem, state, rows, bounds, damping)
         gained, moved = state.cost - better.cost, better.x - state.x
@@ -150,7 +151,7 @@ def fit(
         if not probe:
             near = gained >= TOLERANCE and np.max(np.abs(moved)) < NEAR
             borrowed = columns[:, :, :shared] if near else None
-        columns = None
+        stale, columns = columns, None
     return state
 
 
@@ -176,17 +177,22 @@ def _evaluate(problem: Problem, candidate: Candidate, x: Array, rows: Mask, spen
     )
 
 
-def _spent(columns: Array, borrowed: Array | None) -> int:
-    return columns.shape[2] - (0 if borrowed is None else borrowed.shape[2])
+def _jacobian(problem: Problem, state: Fit, borrowed: Array | None, stale: Array | None = None) -> tuple[Array, int]:
+    """Forward differences, towards the inside of the bounds, and how many simulations they took.
 
-
-def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
-    """Forward differences, towards the inside of the bounds."""
-    _, high = problem.bounds(state.candidate)
+    What stands at a bound of an effect keeps its ``stale`` column, which tells well enough whether it may leave: of a
+    shape's atoms most are absent.
+    """
+    low, high = problem.bounds(state.candidate)
     first = 0 if borrowed is None else borrowed.shape[2]
     columns = np.empty((*state.residual.shape, len(state.x)))
     if borrowed is not None:
         columns[:, :, :first] = borrowed
+    wanted = np.arange(first, len(state.x), dtype=np.intp)
+    if stale is not None:
+        still = (wanted >= problem.fixed) & ((state.x[wanted] <= low[wanted]) | (state.x[wanted] >= high[wanted]))
+        columns[:, :, wanted[still]] = stale[:, :, wanted[still]]
+        wanted = wanted[~still]
     here = problem.predict_coarse(state.candidate, state.x)
 
     def column(m: int) -> Array:
@@ -196,14 +202,14 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None) -> Array:
         change = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
         return np.where(np.isfinite(change), change, 0.0)
 
-    for m, change in enumerate(problem.each(column, range(first, len(state.x))), first):
+    for m, change in zip(wanted, problem.each(column, wanted.tolist()), strict=True):
         columns[:, :, m] = change
-    return columns
+    return columns, len(wanted)
 
 
 def refreshed(problem: Problem, state: Fit) -> Fit:
     """The fit with its sensitivities taken anew where it ended: what others are screened and started by."""
-    return state if state.diverged else replace(state, jacobian=_jacobian(problem, state, None))
+    return state if state.diverged else replace(state, jacobian=_jacobian(problem, state, None)[0])
 
 
 def sensitivities(problem: Problem, state: Fit) -> Fit:

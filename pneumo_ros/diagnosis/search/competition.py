@@ -49,6 +49,7 @@ LOPSIDED: Final = (0.1, 0.6)
 # Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
 NOT_EVIDENT: Final = 0.9
 SHAPED: Final = 3  # leading singles that are fitted with their shapes [numerics]
+PROBED: Final = 45  # singles that are probed, of some seventy that move anything [numerics]
 RIVALS: Final = 3  # other families at the leading single's place that are fitted with their shapes [numerics]
 STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 
@@ -155,7 +156,8 @@ def _run_singles(search: Search) -> None:
     found = trials(problem, search.refit, all_parts(problem))
     search.screened = candidate_scores(problem, search.refit, found)
     search.visible = visibility(problem, search.refit, found)
-    chosen = varied(probed(problem, search.refit, search.screened), effort.singles, 3)
+    likely = probed(problem, search.refit, search.screened[:PROBED])
+    chosen = varied(likely, effort.singles, 3)
     short = short_fits(search, search.refit, chosen, (0.1, 0.4))
     ended = [
         finished(problem, one, effort, search.refit if k < STARTED_TWICE else None)

@@ -24,8 +24,8 @@ from pneumo_ros.diagnosis.search.state import Search
 
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
-COUNTS: Final = (12, 5, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
-EXCHANGED: Final = (6, 3)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
+COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
+EXCHANGED: Final = (4, 2)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
 MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which exchanges are tried [taste]
 MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]

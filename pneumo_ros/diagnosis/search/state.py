@@ -32,10 +32,10 @@ class Effort:
 
     singles: int = 10
     finalists: int = 5
-    seconds: tuple[int, ...] = (6, 4, 2)
+    seconds: tuple[int, ...] = (4, 2)
     blind_pairs: int = 3
     pair_finalists: int = 3
-    probes: int = 24
+    probes: int = 14
     exchanged: int = 6
     short: int = 6
     anew: int = 5
