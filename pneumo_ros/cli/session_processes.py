@@ -49,6 +49,8 @@ def run_session(
         try:
             with supervisor:
                 supervisor.wait()
+            progress.stop()
+            _tell_early(console, target, rig_node, bool(length))
         except SessionError as error:
             progress.stop()
             Console(stderr=True, highlight=False, soft_wrap=True).print(
@@ -59,6 +61,21 @@ def run_session(
         except StopAsked as asked:
             progress.stop()
             _tell_stopped(console, target, str(asked), supervisor.failure_of_lead())
+
+
+def _tell_early(console: Console, target: Path, rig_node: str, timed: bool) -> None:
+    """Nobody ended the session, and yet it is over before its time: somebody stopped the node that is the rig."""
+    from pneumo_ros.log.inspection import end_of_session
+    from pneumo_ros.log.reading import read_log
+
+    complete, reason = end_of_session(read_log(target, []))
+    if not complete:
+        err = Console(stderr=True, highlight=False, soft_wrap=True)
+        err.print(f"[red]session failed:[/red] {escape(reason)}")
+        _save_what_is_left(target)
+        raise typer.Exit(FAILED)
+    if not timed:
+        console.print(f"stopped by whoever ended node {rig_node}; the log is finished")
 
 
 def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None:

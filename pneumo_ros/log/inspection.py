@@ -239,6 +239,13 @@ def read_setups(log: Log) -> Iterator[Setup]:
             yield Setup(time_ns, str(document["node"]), {**(given if isinstance(given, Mapping) else {}), **rest})
 
 
+def end_of_session(log: Log) -> tuple[bool, str]:
+    """(whether the recorder calls the session complete, why not); a log of another recorder is."""
+    ends = [dict(one.metadata) for one in log.metadata if "complete" in one.metadata]
+    last = ends[-1] if ends else {"complete": "true"}
+    return last["complete"] == "true", str(last.get("reason", ""))
+
+
 def read_calibrations(log: Log) -> Iterator[tuple[int, str]]:
     """(log time in ns, YAML) of each calibration that was in force, in log order."""
     name = topics.CALIBRATION.name

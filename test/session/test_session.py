@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from pathlib import Path
 
@@ -130,6 +132,19 @@ def test_interrupt_finishes_the_log(tmp_path: Path) -> None:
     process.send_signal(2)
     said, _ = process.communicate(timeout=60)
     assert process.returncode == 0, said
+    assert read_log(path).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("duration", "code", "words"), [("0", 0, "ended node plant"), ("60", 1, "cut short after")])
+def test_a_rig_that_somebody_stops_is_told(tmp_path: Path, duration: str, code: int, words: str) -> None:
+    """The node that is the rig ends the session when it is asked to: a timed one is not what was wanted."""
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", duration, "--output", str(path), "--no-picture")
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    os.kill(sessions.children(process.pid)["plant"], signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == code and words in " ".join(said.split()), said
     assert read_log(path).topics["/rig/displacement"].count > 100
 
 
