@@ -26,7 +26,7 @@ ATOMS = (
     *(Atom(f"loss {r:g} m/s", "N", 3.0) for r in RATES),
     Atom("loss over load", "N s/m", 20.0),
     *(Atom(f"loss slider {s:g} m", "N", 3.0) for s in SLACKS),
-    *(Atom(f"lift below {100.0 * c:g} %", "N/m", 5e3) for c in LIFTS),
+    *(Atom(f"lift below {100.0 * c:g} %", "N/m", 500.0) for c in LIFTS),
     Atom("progressive", "N/m", 500.0),
     Atom("constant", "N/m", 100.0, signed=True),
 )
