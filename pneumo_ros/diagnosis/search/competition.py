@@ -122,7 +122,7 @@ def _rivals_of_first(search: Search) -> list[Fit]:
     if not found:
         return []
     leader = found[0].candidate.laws[0]
-    taken = {family_of(law[0]) for one in found[:SHAPED] for law in one.candidate.laws}
+    taken = {family_of(law[0]) for one in found[:SHAPED] for law in one.candidate.laws if law[1] == leader[1]}
     rivals: dict[str, CandidateScore] = {}
     for entry in search.screened:
         law = entry.parts[0]
