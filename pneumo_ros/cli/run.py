@@ -144,11 +144,13 @@ def run(
             console.print(f"isolated in domain {claim.domain}")
         with beside(claim.domain, place) if view else nullcontext() as dashboard:
             there = Place(claim.domain, place, (claim.descriptor,))
-            run_session(console, values, target, single_process, there, verbose)
+            code = run_session(console, values, target, single_process, there, verbose)
             report_unless_asked_to_end(console, target, values, Wanted(summary, picture, report))
             if dashboard is not None:
                 console.print("the dashboard stays until Ctrl-C")
                 dashboard.wait()
+    if code:
+        raise typer.Exit(code)
 
 
 def _namespace(text: str) -> str:

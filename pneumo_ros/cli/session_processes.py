@@ -24,8 +24,11 @@ MIN_SAMPLES = 10  # fewer make no figures
 
 def run_session(
     console: Console, values: Values, target: Path, single_process: bool, place: Place, verbose: bool
-) -> None:
-    """Start the nodes, show how far the session is, and see it end; a failed one exits with :data:`FAILED`."""
+) -> int:
+    """Start the nodes, show how far the session is, and see it end; a failed one exits with :data:`FAILED`.
+
+    Returns the exit code: :data:`FAILED` as well where a timed session was cut short without any process failing.
+    """
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from pneumo_ros.session.supervisor import NodeProcess, SessionError, StopAsked, Supervisor
@@ -50,7 +53,7 @@ def run_session(
             with supervisor:
                 supervisor.wait()
             progress.stop()
-            _tell_early(console, target, rig_node, bool(length))
+            return _tell_early(console, target, rig_node, bool(length))
         except SessionError as error:
             progress.stop()
             Console(stderr=True, highlight=False, soft_wrap=True).print(
@@ -61,10 +64,13 @@ def run_session(
         except StopAsked as asked:
             progress.stop()
             _tell_stopped(console, target, str(asked), supervisor.failure_of_lead())
+    return 0
 
 
-def _tell_early(console: Console, target: Path, rig_node: str, timed: bool) -> None:
-    """Nobody ended the session, and yet it is over before its time: somebody stopped the node that is the rig."""
+def _tell_early(console: Console, target: Path, rig_node: str, timed: bool) -> int:
+    """The exit code of a session that nobody ended, and a word where it was over before its time: somebody stopped the
+    node that is the rig.
+    """
     from pneumo_ros.log.inspection import end_of_session
     from pneumo_ros.log.reading import read_log
 
@@ -72,10 +78,10 @@ def _tell_early(console: Console, target: Path, rig_node: str, timed: bool) -> N
     if not complete:
         err = Console(stderr=True, highlight=False, soft_wrap=True)
         err.print(f"[red]session failed:[/red] {escape(reason)}")
-        _save_what_is_left(target)
-        raise typer.Exit(FAILED)
+        return FAILED
     if not timed:
         console.print(f"stopped by whoever ended node {rig_node}; the log is finished")
+    return 0
 
 
 def _tell_stopped(console: Console, target: Path, by: str, failure: str) -> None:

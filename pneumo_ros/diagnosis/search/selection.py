@@ -30,13 +30,14 @@ PARAMETER_PENALTY: Final = 4.0  # cost of each parameter, and of each effect tha
 UNUSED: Final = 1e-3  # share of a typical amplitude below which an atom counts as absent [numerics]
 SAME: Final = 0.05  # relative difference of levels that counts as none, whatever the blocks say [taste]
 # Mean square, sigma squared, that laws of the right kind leave beside noise and their own share of the misfit: where
-# two families leave less, what is left does not tell them apart [calibration]
+# two families leave less, what is left does not tell them apart [calibration: set 0.4, opened]
 ALIKE: Final = 1.0
-LAW_SHARE: Final = 0.05  # of the refit's root mean square: what laws of the right kind leave [calibration]
+LAW_SHARE: Final = 0.05  # of the refit's root mean square: what right laws leave [calibration: set 0.4, opened]
 # Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
-# laws differ by more than chance does [calibration]
+# laws differ by more than chance does [calibration: bench/calibrate_verdict.py]
 SHARPNESS: Final = 36.0
-PER_UNKNOWN: Final = 1.0  # log weight that each unknown used costs: what could fit anything proves less [calibration]
+# Log weight that each unknown used costs: what could fit anything proves less [calibration: set 0.4, opened]
+PER_UNKNOWN: Final = 1.0
 
 
 @dataclass(frozen=True)
