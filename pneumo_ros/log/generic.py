@@ -44,8 +44,6 @@ def joints_of(messages: Sequence[Any]) -> tuple[tuple[str, ...], dict[str, NDArr
     UnfitError
         saying which message has another number of values than names.
     """
-    if any(not hasattr(message, key) for message in messages[:1] for key in ("name", *JOINT_FIELDS)):
-        raise UnfitError("its definition lacks fields of a JointState")
     names = tuple(dict.fromkeys(name for message in messages for name in message.name))
     column = {name: i for i, name in enumerate(names)}
     fields = {key: np.full((len(messages), len(names)), np.nan) for key in JOINT_FIELDS}

@@ -241,7 +241,7 @@ def read_setups(log: Log) -> Iterator[Setup]:
 
 def end_of_session(log: Log) -> tuple[bool, str]:
     """(whether the recorder calls the session complete, why not); a log of another recorder is."""
-    ends = [dict(one.metadata) for one in log.metadata if "complete" in one.metadata]
+    ends = [dict(one.metadata) for one in log.metadata if one.name == "session" and "complete" in one.metadata]
     last = ends[-1] if ends else {"complete": "true"}
     return last["complete"] == "true", str(last.get("reason", ""))
 

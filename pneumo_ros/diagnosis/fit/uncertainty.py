@@ -21,7 +21,7 @@ TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
 # Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
 # [taste]
 LAW: Final = 0.015
-UNUSED: Final = 1e-3  # of a typical size: none [numerics]
+UNUSED: Final = 1e-3  # share of a typical size below which an effect or an atom counts as absent [numerics]
 NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by [numerics]
 
 

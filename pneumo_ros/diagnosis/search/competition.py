@@ -16,7 +16,6 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
@@ -208,24 +207,12 @@ def _exchange_each(search: Search) -> None:
         if alone.diverged:  # without the other effect
             continue
         (kept,) = bare.laws
-        rivals = [p for p in all_parts(problem) if _rivals(problem, law, p) and compatible(problem.model, kept, p)]
+        rivals = [p for p in all_parts(problem) if rival(problem, law, p) and compatible(problem.model, kept, p)]
         tried = {frozenset(f.candidate.parts) for f in search.pairs[: effort.pair_finalists]}
         screened = candidate_scores(problem, alone, trials(problem, alone, rivals))
         fresh = [p for p in screened if frozenset((*bare.parts, *p.parts)) not in tried][: effort.exchanged]
         for short in short_fits(search, alone, probed(problem, alone, fresh)[:1], (0.86, 0.88)):
             search.pairs = by_cost([*search.pairs[: effort.pair_finalists], finished(problem, short, effort)])
-
-
-def _rivals(problem: Problem, part: Part, other: Part) -> bool:
-    """Whether two effects at the same site are blamed on the same place."""
-    if part[0] == other[0] or part[1] != other[1]:
-        return False
-    one, two = (problem.model.places(problem.active(Candidate((p,)), _typical(problem, p))[0]) for p in (part, other))
-    return one[:1] == two[:1]
-
-
-def _typical(problem: Problem, part: Part) -> Array:
-    return np.array([p.typical for p in problem.effect_parameters(Candidate((part,)))])
 
 
 def _try_without_each(search: Search) -> None:

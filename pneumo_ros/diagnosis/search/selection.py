@@ -21,20 +21,20 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, robust_mean
+from pneumo_ros.diagnosis.fit.uncertainty import UNUSED
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.paths import share_file
 
 # Mean square, sigma squared, that is added to both levels compared: what model form leaves is no evidence [taste]
 FORM: Final = 0.5
 PARAMETER_PENALTY: Final = 4.0  # cost of each parameter, and of each effect that is claimed at both ends [taste]
-UNUSED: Final = 1e-3  # share of a typical amplitude below which an atom counts as absent [numerics]
 SAME: Final = 0.05  # relative difference of levels that counts as none, whatever the blocks say [taste]
 # Mean square, sigma squared, that laws of the right kind leave beside noise and their own share of the misfit: where
 # two families leave less, what is left does not tell them apart [calibration: set 0.4, opened]
 ALIKE: Final = 1.0
 LAW_SHARE: Final = 0.05  # of the refit's root mean square: what right laws leave [calibration: set 0.4, opened]
 # Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
-# laws differ by more than chance does [calibration: bench/calibrate_verdict.py]
+# laws differ by more than chance does [calibration: development cases of 0.3]
 SHARPNESS: Final = 36.0
 # Log weight that each unknown used costs: what could fit anything proves less [calibration: set 0.4, opened]
 PER_UNKNOWN: Final = 1.0

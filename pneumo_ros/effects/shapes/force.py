@@ -22,7 +22,7 @@ from pneumo_ros.effects.shapes.atoms import Atom, Term
 from pneumo_ros.units import INCH
 
 RATES = (0.012, 0.022, 0.04, 0.13, 0.4)  # m/s at which a ramp saturates; shorter ones stick, which sliders do
-FRICTION, DAMPING = RATES[:2], RATES[1:]  # of a valve that blows off soon and of a soft friction: either may be called
+FRICTION, DAMPING = RATES[:2], RATES[1:]  # the ramp they share is a soft friction's and an early blow-off's alike
 SLACKS = (6e-5, 3e-4, 1.2e-3, 4e-3, 1.2e-2)  # m of travel before a slider slips
 STOPS = (0.0335, 0.036, 0.0385, 0.041, 0.043)  # m, heights below which a stop's ramps begin
 STRAPS = (0.0485, 0.051, 0.0535)  # m, heights above which a strap's begin
