@@ -32,6 +32,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from pneumo_ros import __version__
 from pneumo_ros.cli.app import App
+from pneumo_ros.cli.interruption import interrupt
 from pneumo_ros.errors import PneumoError, not_one_of
 
 BAD_INPUT = 2
@@ -86,7 +87,7 @@ class LazyGroup(TyperGroup):
         if name not in VERBS:
             raise not_one_of("no such verb", name, VERBS, where="pneumo")
         command = self.get_command(ctx, name)
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on a verb may have something to end
+        signal.signal(signal.SIGINT, interrupt)  # from here on a verb may have something to end
         return name, command, args[1:]
 
     def invoke(self, ctx: Any) -> Any:

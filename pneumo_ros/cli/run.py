@@ -26,7 +26,7 @@ from pneumo_ros.cli.session_plan import (
     settings_of_options,
 )
 from pneumo_ros.cli.session_processes import run_session
-from pneumo_ros.cli.session_result import Wanted, report_unless_asked_to_end
+from pneumo_ros.cli.session_result import Wanted, heard_no_more_after, report_unless_asked_to_end
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError, not_one_of
 
@@ -139,13 +139,13 @@ def run(
     if use_sim_time:
         for own in values.values():
             own["use_sim_time"] = True
-    with _alone(domain, place, isolate, source, target) as claim:
+    with heard_no_more_after(), _alone(domain, place, isolate, source, target) as claim:
         if isolate:
             console.print(f"isolated in domain {claim.domain}")
         with beside(claim.domain, place) if view else nullcontext() as dashboard:
             there = Place(claim.domain, place, (claim.descriptor,))
             code = run_session(console, values, target, single_process, there, verbose)
-            report_unless_asked_to_end(console, target, values, Wanted(summary, picture, report))
+            report_unless_asked_to_end(console, target, values, Wanted(summary, picture, report), code)
             if dashboard is not None:
                 console.print("the dashboard stays until Ctrl-C")
                 dashboard.wait()
@@ -165,9 +165,9 @@ def _namespace(text: str) -> str:
 def _alone(domain: int | None, namespace: str, isolate: bool, source: str, target: Path) -> Iterator[Claim]:
     """A place in the ROS graph where no other session is; nothing is started before that is known."""
     from pneumo_ros.nodes.neighbours import claim_place
+    from pneumo_ros.session.middleware import middleware_settings
 
-    # A session stays on this computer unless the user opened it to the network.
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    os.environ |= middleware_settings(os.environ)
     claim = claim_place(domain, namespace, isolate, f"{source}, {target}", valves=source == "serial")
     try:
         yield claim

@@ -4,16 +4,22 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
+from pneumo_ros.cli.interruption import Interrupted, interrupt
 from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
     from pneumo_ros.session.plan import Values
     from pneumo_ros.session.summary import Recorded
+
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # who sends one asks for the session's end
 
 
 class Wanted(NamedTuple):
@@ -24,15 +30,32 @@ class Wanted(NamedTuple):
     page: bool
 
 
-def report_unless_asked_to_end(console: Console, target: Path, values: Values, wanted: Wanted) -> None:
-    """The session and its log are done; who asks again to end gets no report."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+def report_unless_asked_to_end(console: Console, target: Path, values: Values, wanted: Wanted, code: int) -> None:
+    """The session and its log are done; who asks again to end gets no report, and the session's own exit ``code``."""
+    for number in ENDING:
+        signal.signal(number, interrupt)
     try:
         _report(console, target, values, wanted)
-    except KeyboardInterrupt:
+    except Interrupted:
+        _hear_no_more()
         console.print(f"no report was made; log {target}")
-        raise typer.Exit from None
+        raise typer.Exit(code) from None
+
+
+@contextmanager
+def heard_no_more_after() -> Iterator[None]:
+    """Whoever asks for an end when all has ended is not heard: the signal would kill the leaving interpreter, and a
+    finished session would end with a code that says otherwise.
+    """
+    try:
+        yield
+    finally:
+        _hear_no_more()
+
+
+def _hear_no_more() -> None:
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _report(console: Console, target: Path, values: Values, wanted: Wanted) -> None:

@@ -100,12 +100,12 @@ def beside(domain_id: int | None, namespace: str = "") -> Iterator[Viewer]:
     Who kills this process ends the dashboard as well: nobody would know its address any more.
     """
     _need_bokeh()
+    from pneumo_ros.session.middleware import middleware_settings
     from pneumo_ros.session.supervisor import SUPERVISOR
 
     domain = ["--domain-id", str(domain_id)] if domain_id is not None else []
     domain += ["--namespace", namespace] if namespace else []
-    environment = {**os.environ, SUPERVISOR: str(os.getpid())}
-    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    environment = {**os.environ, **middleware_settings(os.environ), SUPERVISOR: str(os.getpid())}
     process = subprocess.Popen(
         [sys.executable, "-m", "pneumo_ros.cli.view", *domain], env=environment, start_new_session=True
     )

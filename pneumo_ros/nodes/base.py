@@ -21,7 +21,6 @@ from rcl_interfaces.msg import (
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
-from rclpy.duration import Duration
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -34,6 +33,7 @@ from std_msgs.msg import String
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
+from pneumo_ros.nodes.delivery import DELIVERY_PATIENCE, delivered
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
@@ -66,7 +66,7 @@ COMMON: tuple[Parameter, ...] = (
 )  # fmt: skip
 FAILED = 1  # exit code of a node that ends its session because something is wrong
 SAY_AGAIN = 1.0  # s between log lines about events of one code
-ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
+FAILED_PATIENCE = 2.0  # s to wait for subscribers of a failed session: the one that failed confirms nothing
 READY_PERIOD = 0.05  # s between looks at the graph while waiting for subscribers
 DIAGNOSTIC_PERIOD = 1.0  # s, REP 107
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -270,8 +270,9 @@ class RigNode(Node):
 
     def on_stop(self, executor: Executor) -> None:
         """Called when the session ends, after the last callback; what was published is delivered first."""
-        for _, made in self._outgoing:
-            made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
+        patience = FAILED_PATIENCE if self.stop.failed else DELIVERY_PATIENCE
+        if not delivered((made for _, made in self._outgoing), patience):
+            self.get_logger().warning(f"not every subscriber confirmed the last messages within {patience:g} s")
 
     def fail(self, code: str, text: str) -> None:
         """End the session because of ``text``; said once."""

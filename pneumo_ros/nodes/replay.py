@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.context import Context
-from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -25,6 +24,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import encode_clock
 from pneumo_ros.log.decoded import Log
+from pneumo_ros.nodes.delivery import delivered
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import recorded_qos
 from pneumo_ros.nodes.spin import SPIN_TIMEOUT
@@ -35,7 +35,6 @@ INPUTS = (
 )  # fmt: skip
 """What estimator and controller take in, and what describes it; the rest of a log are their outputs."""
 CLOCK_PERIOD = 10_000_000  # ns of wall time between /clock messages: 100 Hz, as Gazebo does
-ACK_TIMEOUT = 2.0  # s to wait for subscribers to confirm what was published
 IDLE = 0.01  # s between looks while nothing is due
 
 
@@ -163,9 +162,7 @@ class Player:
 
     def flush(self) -> None:
         """Wait until reliable subscribers have confirmed everything."""
-        for made in self._publishers:
-            if made is not None:
-                made.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
+        delivered(made for made in self._publishers if made is not None)
 
     def _publish_up_to(self, now: int) -> None:
         end = int(np.searchsorted(self._tape.time_ns, now, side="right"))

@@ -22,13 +22,14 @@ import yaml
 
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.parameters import Value
+from pneumo_ros.session.middleware import middleware_settings
 
 SUPERVISOR = "PNEUMO_SUPERVISOR"  # environment variable: process whose end ends the nodes as well
 PROGRESS = "PROGRESS "
 POLL = 0.02  # s
 FATAL = "Fatal Python error"  # begins what the interpreter prints of a crash: threads and modules follow
 LOGGED = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[")  # how rcl's logger begins a line
-STOP_PATIENCE = 5.0  # s a process has to end after SIGINT before it is killed
+STOP_PATIENCE = 10.0  # s a process has to end after SIGINT before it is killed; its last messages may take 7 s
 RECORDER_PATIENCE = 60.0  # s; a slow disk may still be taking the log
 START_PATIENCE = 60.0  # s until the first sample; the first start on a machine compiles the plant
 RECORDER = "session_recorder"
@@ -135,8 +136,7 @@ class Supervisor:
         self._folder = tempfile.TemporaryDirectory(prefix="pneumo-")
         self._lines: queue.SimpleQueue[tuple[NodeProcess, str]] = queue.SimpleQueue()
         self._environment = dict(os.environ)
-        # A session stays on this computer unless the user opened it to the network.
-        self._environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        self._environment |= middleware_settings(self._environment)
         if self._place.domain_id is not None:
             self._environment["ROS_DOMAIN_ID"] = str(self._place.domain_id)
         self._environment[END_REASON] = str(Path(self._folder.name) / "end_reason")

@@ -136,6 +136,22 @@ def test_interrupt_finishes_the_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_impatient_user_ends_it_as_well_as_a_patient_one(tmp_path: Path) -> None:
+    """Ctrl-C a hundred times a second, from the first to the last moment: one of them meets every stage of the end."""
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "0", "--output", str(path))
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    end = time.monotonic() + 60.0
+    while process.poll() is None and time.monotonic() < end:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.01)
+    said, _ = process.communicate(timeout=5)
+    assert process.returncode == 0 and "Traceback" not in said, said
+    assert "the log is finished" in said and "no report was made" in said, said
+    assert read_log(path).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("duration", "code", "words"), [("0", 0, "ended node plant"), ("60", 1, "cut short after")])
 def test_a_rig_that_somebody_stops_is_told(tmp_path: Path, duration: str, code: int, words: str) -> None:
     """The node that is the rig ends the session when it is asked to: a timed one is not what was wanted."""
@@ -146,6 +162,21 @@ def test_a_rig_that_somebody_stops_is_told(tmp_path: Path, duration: str, code: 
     said, _ = process.communicate(timeout=60)
     assert process.returncode == code and words in " ".join(said.split()), said
     assert read_log(path).topics["/rig/displacement"].count > 100
+
+
+@pytest.mark.slow
+def test_a_session_that_was_cut_short_stays_so_without_its_report(tmp_path: Path) -> None:
+    path = tmp_path / "session.mcap"
+    process = sessions.start("--duration", "60", "--output", str(path))
+    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    os.kill(sessions.children(process.pid)["plant"], signal.SIGINT)
+    assert process.stdout is not None
+    said = next(line for line in process.stdout if "cut short" in line)
+    while process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.01)
+    said += process.stdout.read()
+    assert process.returncode == 1 and "no report was made" in said and "Traceback" not in said, said
 
 
 @pytest.mark.slow

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The last message of a node that ends, to a subscriber in another process that is held up meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from helpers import sessions
+
+from pneumo_ros.session.middleware import FAST_DDS_PROFILES, middleware_settings
+
+LISTENER = """
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+rclpy.init()
+node = Node("listener")
+kept = [node.create_subscription(String, topic, lambda _: None, 10) for topic in ("/one", "/two")]
+rclpy.spin(node)
+"""
+
+TALKER = """
+import json, os, signal, subprocess, sys, time
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+from pneumo_ros.nodes.delivery import delivered
+listener, held = int(sys.argv[1]), float(sys.argv[2])
+rclpy.init()
+node = Node("talker")
+made = [node.create_publisher(String, topic, 10) for topic in ("/one", "/two")]
+while not all(one.get_subscription_count() for one in made):
+    time.sleep(0.02)
+os.kill(listener, signal.SIGSTOP)
+for one in made:
+    one.publish(String(data="the end"))
+began = time.monotonic()
+early = delivered(made, patience=0.5)
+lost = time.monotonic() - began
+subprocess.Popen(["sh", "-c", f"sleep {held}; kill -CONT {listener}"])  # the wait holds this interpreter
+began = time.monotonic()
+print(json.dumps([early, lost, delivered(made), time.monotonic() - began]))
+"""
+
+
+def test_a_subscriber_that_was_held_up_gets_the_last_message_once_it_goes_on() -> None:
+    environment = sessions.environment() | {"ROS_DOMAIN_ID": str(sessions.own_domain())}
+    environment |= middleware_settings(environment)
+    listener = subprocess.Popen([sys.executable, "-c", LISTENER], env=environment)
+    try:
+        done = subprocess.run([sys.executable, "-c", TALKER, str(listener.pid), "2.5"], env=environment,
+                              capture_output=True, text=True, timeout=60)  # fmt: skip
+    finally:
+        os.kill(listener.pid, signal.SIGCONT)
+        listener.kill()
+        listener.wait()
+    early, lost, late, took = json.loads(done.stdout)
+    assert not early and 0.5 <= lost < 0.9, "the patience is for all publishers together"
+    assert late and 2.5 <= took < 5.0, "with the middleware's own heartbeat it takes 6 s"
+
+
+def test_what_the_user_told_the_middleware_stays() -> None:
+    own = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", FAST_DDS_PROFILES: "/mine.xml"}
+    assert middleware_settings(own) == {}
+    assert Path(middleware_settings({})[FAST_DDS_PROFILES]).is_file()
