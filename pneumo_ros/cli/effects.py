@@ -64,7 +64,7 @@ def _show(console: Console, effect: Effect) -> None:
     if effect.guide is not None:
         console.print(escape(effect.guide.meaning))
     console.print(f"\n[bold]acts at[/] {sites_of(effect)}; [bold]blamed on[/] {places_of(effect)}")
-    console.print(plain_table(("parameter", "typical", "from", "to", "unit"), parameter_rows(effect)))
+    console.print(plain_table(("parameter", "typical", "from", "to", "unit", "what it is"), parameter_rows(effect)))
     if effect.guide is None:
         return
     console.print(f"[bold]by hand[/] (with typical values): {escape(check_words(effect))}")

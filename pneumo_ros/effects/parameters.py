@@ -38,6 +38,7 @@ class EffectParameter:
     spread : prior standard deviation, in typical values; infinite where nothing is known beforehand
     ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
         well stop; a stop at another bound is counted against the effect
+    meaning : what it is, in a few words for who has not read the law; '' where nobody wrote it
     """
 
     name: str
@@ -49,6 +50,7 @@ class EffectParameter:
     starts: tuple[float, ...] = ()
     ends: tuple[float, ...] = (0.0,)
     spread: float = math.inf
+    meaning: str = ""
 
     def __post_init__(self) -> None:
         if not self.low < self.high:

@@ -21,8 +21,8 @@ def places_of(effect: Effect) -> str:
 
 
 def parameter_rows(effect: Effect) -> list[tuple[str, ...]]:
-    """(name, typical, low, high, unit) of each parameter, SI."""
-    return [(p.name, f"{p.typical:g}", f"{p.low:g}", f"{p.high:g}", p.unit) for p in effect.parameters]
+    """(name, typical, low, high, unit, meaning) of each parameter, SI."""
+    return [(p.name, f"{p.typical:g}", f"{p.low:g}", f"{p.high:g}", p.unit, p.meaning) for p in effect.parameters]
 
 
 def check_words(effect: Effect, values: Mapping[str, float] | None = None) -> str:
@@ -42,7 +42,7 @@ def _section(effect: Effect) -> str:
     guide = effect.guide
     lines = [f"## {effect.id}", "", f"{guide.meaning if guide else effect.summary}", ""]
     lines += [f"Acts at {sites_of(effect)}; blamed on `{places_of(effect)}`.", ""]
-    lines += ["| parameter | typical | from | to | unit |", "|---|---|---|---|---|"]
+    lines += ["| parameter | typical | from | to | unit | what it is |", "|---|---|---|---|---|---|"]
     lines += ["| `" + "` | ".join((row[0], " | ".join(row[1:]))) + " |" for row in parameter_rows(effect)]
     if guide is not None:
         lines += ["", f"**By hand** (with typical values): {check_words(effect)}.", ""]

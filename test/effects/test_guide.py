@@ -26,6 +26,7 @@ def test_the_facts_fit_the_effect(name: str) -> None:
     effect = LIBRARY[name]
     assert effect.guide is not None and effect.guide.meaning.endswith(".")
     assert effect.guide.names() <= {p.name for p in effect.parameters}
+    assert all(10 < len(p.meaning) < 60 and not p.meaning.endswith(".") for p in effect.parameters)
     assert effect.guide.mistaken_for and set(effect.guide.mistaken_for) <= set(LIBRARY) - {name}
     said = check_words(effect)
     assert "{" not in said and len(said) > 40
@@ -45,6 +46,8 @@ def test_an_effect_is_read_on_the_terminal(width: str) -> None:
     for part in ("leak:", "acts at front, rear, both", "front|rear_air", "leak_area", "2e-07", "by hand", "0.2 mm2",
                  "not supply_droop"):  # fmt: skip
         assert part in words, words
+    for word in ("0 a hole,", "area of the"):  # what the parameters are; a narrow terminal breaks the lines
+        assert word in words, words
     listed = CliRunner().invoke(app, [], env={"COLUMNS": width})
     assert all(name in listed.output for name in LIBRARY) and "…" not in listed.output
 

@@ -47,10 +47,23 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("hysteresis_force", "N", 0.0, 150.0, 8.0, size=True, starts=(2.0, 30.0)),
-        EffectParameter("yield_travel", "m", 5e-4, 3e-2, 4e-3, starts=(1.5e-3,)),
-        EffectParameter("sharpness", "1", 0.7, 4.0, 1.5),
-        EffectParameter("unloading", "1", -0.3, 1.3, 0.5),
+        EffectParameter(
+            "hysteresis_force",
+            "N",
+            0.0,
+            150.0,
+            8.0,
+            size=True,
+            starts=(2.0, 30.0),
+            meaning="largest force of the rubber's hysteresis",
+        ),
+        EffectParameter(
+            "yield_travel", "m", 5e-4, 3e-2, 4e-3, starts=(1.5e-3,), meaning="travel over which that force builds up"
+        ),
+        EffectParameter("sharpness", "1", 0.7, 4.0, 1.5, meaning="corner of the loop: 1 round, 4 nearly a right angle"),
+        EffectParameter(
+            "unloading", "1", -0.3, 1.3, 0.5, meaning="how it lets go after a reversal: 0 elastically, 1 steepest"
+        ),
     ),
     term=PlantTerm(states=1, advance=advance, force=force),
     guide=Guide(

@@ -58,10 +58,22 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True),
-        EffectParameter("mode_frequency", "Hz", 3.0, 40.0, 15.0, starts=(8.0, 28.0)),
-        EffectParameter("mode_damping_ratio", "1", 0.01, 0.25, 0.08),
-        EffectParameter("wall_share", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0)),
+        EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True, meaning="mass of the part that swings"),
+        EffectParameter(
+            "mode_frequency", "Hz", 3.0, 40.0, 15.0, starts=(8.0, 12.0, 28.0), meaning="frequency at which it rings"
+        ),
+        EffectParameter(
+            "mode_damping_ratio", "1", 0.01, 0.25, 0.08, meaning="damping of the ringing, 1 would be critical"
+        ),
+        EffectParameter(
+            "wall_share",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            ends=(0.0, 1.0),
+            meaning="share of that damping that is the wall's own stretching",
+        ),
     ),
     term=PlantTerm(states=2, start=start, advance=advance, force=force),
     guide=Guide(

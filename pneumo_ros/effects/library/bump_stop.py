@@ -33,10 +33,22 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("stop_stiffness", "N/m", 0.0, 1e6, 2e4, size=True, starts=(1e5,)),
-        EffectParameter("stop_lead", "m", 0.0, 0.014, 0.004, starts=(0.008, 0.012, 0.001)),
-        EffectParameter("stop_hardening", "1/m", 0.0, 1e4, 100.0),
-        EffectParameter("stop_damping", "s/m", 0.0, 2.0, 0.2),
+        EffectParameter(
+            "stop_stiffness", "N/m", 0.0, 1e6, 2e4, size=True, starts=(1e5,), meaning="stiffness at the first touch"
+        ),
+        EffectParameter(
+            "stop_lead",
+            "m",
+            0.0,
+            0.014,
+            0.004,
+            starts=(0.008, 0.012, 0.001),
+            meaning="how much earlier the strut meets it than the nominal stop",
+        ),
+        EffectParameter("stop_hardening", "1/m", 0.0, 1e4, 100.0, meaning="growth of the stiffness with the depth"),
+        EffectParameter(
+            "stop_damping", "s/m", 0.0, 2.0, 0.2, meaning="loss: growth of the push with the speed inwards"
+        ),
     ),
     term=PlantTerm(force=force),
     guide=Guide(

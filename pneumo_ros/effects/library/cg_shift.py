@@ -19,7 +19,18 @@ EFFECT = Effect(
     summary="the centre of mass is not where the configuration says",
     sites=RIG,
     places=("body_pitch", "body_heave"),
-    parameters=(EffectParameter("cg_shift_forward", "m", -0.12, 0.12, 0.008, size=True, starts=(-0.008,)),),
+    parameters=(
+        EffectParameter(
+            "cg_shift_forward",
+            "m",
+            -0.12,
+            0.12,
+            0.008,
+            size=True,
+            starts=(-0.008,),
+            meaning="how far the centre of mass lies ahead",
+        ),
+    ),
     plant=plant,
     guide=Guide(
         meaning="The centre of mass is not where the rig file says.",

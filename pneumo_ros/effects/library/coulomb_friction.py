@@ -55,9 +55,22 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("friction_force", "N", 0.0, 80.0, 6.0, size=True, starts=(1.5, 20.0)),
-        EffectParameter("bristle_length", "m", 2e-5, 8e-4, 2e-4),
-        EffectParameter("stribeck_excess", "1", 0.0, 1.0, 0.25),
+        EffectParameter(
+            "friction_force",
+            "N",
+            0.0,
+            80.0,
+            6.0,
+            size=True,
+            starts=(1.5, 20.0),
+            meaning="friction while the strut slides",
+        ),
+        EffectParameter(
+            "bristle_length", "m", 2e-5, 8e-4, 2e-4, meaning="travel over which a stuck strut still gives way"
+        ),
+        EffectParameter(
+            "stribeck_excess", "1", 0.0, 1.0, 0.25, meaning="break-away force beyond the sliding one, as a share of it"
+        ),
     ),
     term=PlantTerm(states=1, advance=advance, force=force),
     guide=Guide(

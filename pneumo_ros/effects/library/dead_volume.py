@@ -18,7 +18,17 @@ EFFECT = Effect(
     summary="volume of hose and fittings beside the spring's own",
     sites=ENDS,
     places=("{end}_air",),
-    parameters=(EffectParameter("dead_volume", "m3", -2e-5, 3e-4, 1e-5, size=True),),
+    parameters=(
+        EffectParameter(
+            "dead_volume",
+            "m3",
+            -2e-5,
+            3e-4,
+            1e-5,
+            size=True,
+            meaning="volume of hoses and fittings beside the bellows'",
+        ),
+    ),
     plant=plant,
     guide=Guide(
         meaning="Hoses and fittings hold air beside the spring: it is softer and fills more slowly.",

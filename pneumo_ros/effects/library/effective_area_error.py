@@ -31,8 +31,26 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("area_error", "1", -0.4, 0.4, 0.04, size=True, starts=(-0.04,)),
-        EffectParameter("area_slope_error", "1", -1.5, 1.5, 0.1, size=True, starts=(-0.1,)),
+        EffectParameter(
+            "area_error",
+            "1",
+            -0.4,
+            0.4,
+            0.04,
+            size=True,
+            starts=(-0.04,),
+            meaning="error of the effective area at mid height, as a share",
+        ),
+        EffectParameter(
+            "area_slope_error",
+            "1",
+            -1.5,
+            1.5,
+            0.1,
+            size=True,
+            starts=(-0.1,),
+            meaning="how that error grows with the height, per mid height",
+        ),
     ),
     term=PlantTerm(force=force),
     guide=Guide(

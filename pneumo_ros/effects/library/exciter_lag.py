@@ -23,8 +23,10 @@ EFFECT = Effect(
     sites=ENDS,
     places=("road_input",),
     parameters=(
-        EffectParameter("exciter_lag", "s", 0.0, 0.1, 0.005, size=True, starts=(0.015,)),
-        EffectParameter("exciter_damping_ratio", "1", 0.3, 2.0, 0.8),
+        EffectParameter(
+            "exciter_lag", "s", 0.0, 0.1, 0.005, size=True, starts=(0.015,), meaning="time constant of the exciter"
+        ),
+        EffectParameter("exciter_damping_ratio", "1", 0.3, 2.0, 0.8, meaning="below 1 it overshoots"),
     ),
     derived=(Derived("exciter_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,

@@ -46,7 +46,18 @@ EFFECT = Effect(
     summary="the air exchanges heat with the bellows' wall, so that slow strokes are nearly isothermal",
     sites=ENDS,
     places=("{end}_air",),
-    parameters=(EffectParameter("wall_conductance", "W/K", 0.0, 20.0, 0.2, size=True, starts=(1.0,)),),
+    parameters=(
+        EffectParameter(
+            "wall_conductance",
+            "W/K",
+            0.0,
+            20.0,
+            0.2,
+            size=True,
+            starts=(1.0,),
+            meaning="heat from the wall per kelvin that the air is colder",
+        ),
+    ),
     term=PlantTerm(states=1, start=start, advance=advance, air=air),
     guide=Guide(
         meaning="The air gives heat to the bellows' wall: slow strokes are nearly isothermal, fast ones adiabatic.",

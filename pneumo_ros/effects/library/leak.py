@@ -43,8 +43,10 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_air",),
     parameters=(
-        EffectParameter("leak_area", "m2", 0.0, 5e-6, 2e-7, size=True),
-        EffectParameter("leak_law", "1", 0.0, 1.2, 0.6),
+        EffectParameter(
+            "leak_area", "m2", 0.0, 5e-6, 2e-7, size=True, meaning="area of the hole with the same flow at 3 bar"
+        ),
+        EffectParameter("leak_law", "1", 0.0, 1.2, 0.6, meaning="0 a hole, 1 a long narrow gap"),
     ),
     term=PlantTerm(air=air),
     guide=Guide(

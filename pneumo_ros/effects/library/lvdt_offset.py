@@ -14,7 +14,9 @@ EFFECT = Effect(
     summary="an LVDT's zero is off",
     sites=DISPLACEMENTS,
     places=(),
-    parameters=(EffectParameter("offset", "m", -0.03, 0.03, 1e-3, size=True),),
+    parameters=(
+        EffectParameter("offset", "m", -0.03, 0.03, 1e-3, size=True, meaning="what the sensor reads too much"),
+    ),
     outputs=shifted,
     undo=unshifted,
     guide=Guide(

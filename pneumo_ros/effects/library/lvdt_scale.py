@@ -29,7 +29,9 @@ EFFECT = Effect(
     summary="an LVDT's sensitivity is off",
     sites=DISPLACEMENTS,
     places=(),
-    parameters=(EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),),
+    parameters=(
+        EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True, meaning="error of the sensitivity, as a share"),
+    ),
     outputs=outputs,
     undo=undo,
     guide=Guide(

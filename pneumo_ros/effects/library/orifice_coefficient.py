@@ -39,9 +39,22 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_air",),
     parameters=(
-        EffectParameter("coefficient_error", "1", -0.7, 1.0, 0.08, size=True, starts=(-0.08,)),
-        EffectParameter("ratio_slope", "1", -2.0, 2.0, 0.5, starts=(-0.5,)),
-        EffectParameter("outlet_share", "1", -0.2, 1.2, 0.5, starts=(0.0,)),
+        EffectParameter(
+            "coefficient_error",
+            "1",
+            -0.7,
+            1.0,
+            0.08,
+            size=True,
+            starts=(-0.08,),
+            meaning="error of the inlet's flow at a pressure ratio of 0.5",
+        ),
+        EffectParameter(
+            "ratio_slope", "1", -2.0, 2.0, 0.5, starts=(-0.5,), meaning="how that error grows with the pressure ratio"
+        ),
+        EffectParameter(
+            "outlet_share", "1", -0.2, 1.2, 0.5, starts=(0.0,), meaning="share of the error that the outlet has as well"
+        ),
     ),
     term=PlantTerm(air=air),
     guide=Guide(

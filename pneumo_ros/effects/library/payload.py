@@ -18,7 +18,9 @@ EFFECT = Effect(
     summary="unknown load on the body",
     sites=RIG,
     places=("body_heave", "body_pitch"),
-    parameters=(EffectParameter("payload", "kg", -15.0, 40.0, 2.0, size=True, starts=(-2.0,)),),
+    parameters=(
+        EffectParameter("payload", "kg", -15.0, 40.0, 2.0, size=True, starts=(-2.0,), meaning="mass of the load"),
+    ),
     plant=plant,
     guide=Guide(
         meaning="More (or less) lies on the body than the rig file says.",

@@ -26,8 +26,18 @@ EFFECT = Effect(
     sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(
-        EffectParameter("sensor_lag", "s", 0.0, 0.2, 0.005, size=True, starts=(0.02,)),
-        EffectParameter("sensor_damping_ratio", "1", 0.3, 5.0, 0.8, starts=(2.0,)),
+        EffectParameter(
+            "sensor_lag", "s", 0.0, 0.2, 0.005, size=True, starts=(0.02,), meaning="time constant of sensor and tube"
+        ),
+        EffectParameter(
+            "sensor_damping_ratio",
+            "1",
+            0.3,
+            5.0,
+            0.8,
+            starts=(2.0,),
+            meaning="below 1 the tube rings, above 2 it creeps",
+        ),
     ),
     derived=(Derived("sensor_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     outputs=outputs,

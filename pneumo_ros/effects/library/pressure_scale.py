@@ -32,8 +32,10 @@ EFFECT = Effect(
     sites=PRESSURES_OR_BOTH,
     places=(),
     parameters=(
-        EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True),
-        EffectParameter("pivot_pressure", "Pa", 0.0, ATMOSPHERE, 5e4),
+        EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True, meaning="error of the sensitivity, as a share"),
+        EffectParameter(
+            "pivot_pressure", "Pa", 0.0, ATMOSPHERE, 5e4, meaning="pressure that it reads right: 0 or the atmosphere's"
+        ),
     ),
     outputs=outputs,
     undo=undo,

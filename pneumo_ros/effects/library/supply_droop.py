@@ -49,8 +49,25 @@ EFFECT = Effect(
     sites=RIG,
     places=("supply",),
     parameters=(
-        EffectParameter("supply_resistance", "Pa s/kg", 0.0, 3e8, 1e7, size=True, starts=(4e7,)),
-        EffectParameter("supply_time_constant", "s", 0.002, 20.0, 0.3, starts=(0.03, 3.0)),
+        EffectParameter(
+            "supply_resistance",
+            "Pa s/kg",
+            0.0,
+            3e8,
+            1e7,
+            size=True,
+            starts=(4e7,),
+            meaning="fall of the supply for each kg/s drawn",
+        ),
+        EffectParameter(
+            "supply_time_constant",
+            "s",
+            0.002,
+            20.0,
+            0.3,
+            starts=(0.03, 3.0),
+            meaning="time in which it falls and recovers",
+        ),
     ),
     term=PlantTerm(states=1, start=start, advance=advance, supply=supply, shared=True),
     guide=Guide(

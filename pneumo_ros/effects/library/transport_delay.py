@@ -23,7 +23,9 @@ EFFECT = Effect(
     summary="the valve command acts late by a pure delay",
     sites=ENDS,
     places=("{end}_air",),
-    parameters=(EffectParameter("delay", "s", 0.0, 0.2, 0.012, size=True, starts=(0.04,)),),
+    parameters=(
+        EffectParameter("delay", "s", 0.0, 0.2, 0.012, size=True, starts=(0.04,), meaning="time until a command acts"),
+    ),
     inputs=inputs,
     guide=Guide(
         meaning="The command acts late by a pure delay: bus, driver, valve electronics.",

@@ -26,7 +26,11 @@ EFFECT = Effect(
     summary="viscous damping of the tyre",
     sites=ENDS,
     places=("{end}_tyre",),
-    parameters=(EffectParameter("tyre_damping", "N s/m", 0.0, 500.0, 20.0, size=True),),
+    parameters=(
+        EffectParameter(
+            "tyre_damping", "N s/m", 0.0, 500.0, 20.0, size=True, meaning="force of the rubber for each m/s"
+        ),
+    ),
     term=PlantTerm(tyre=tyre),
     guide=Guide(
         meaning="The tyre takes energy by itself.",

@@ -26,7 +26,18 @@ EFFECT = Effect(
     summary="the wheel leaves the ground: no pull from the tyre",
     sites=ENDS,
     places=("{end}_tyre",),
-    parameters=(EffectParameter("lost_pull", "1", 0.0, 1.0, 0.9, size=True, ends=(0.0, 1.0)),),
+    parameters=(
+        EffectParameter(
+            "lost_pull",
+            "1",
+            0.0,
+            1.0,
+            0.9,
+            size=True,
+            ends=(0.0, 1.0),
+            meaning="share of the nominal pull that is not there: 1 none is left",
+        ),
+    ),
     term=PlantTerm(tyre=tyre),
     guide=Guide(
         meaning="The wheel leaves the ground: the linear tyre of the model would pull it back.",

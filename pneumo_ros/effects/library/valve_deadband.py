@@ -1,37 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The valve does not answer small commands: overlap near the seat, and a spool that sticks until pulled far enough.
-
-Kernel arguments
-----------------
-u : (N,) commands, m2
-"""
+"""The valve does not answer small commands: overlap near the seat, and a spool that sticks until pulled far enough."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
+from pneumo_ros.effects.filters import played
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
-
-
-@njit(cache=True)
-def _played(u: NDArray[np.float64], half: float, held: float) -> NDArray[np.float64]:
-    """Backlash of half width ``half``: the follower, at ``held`` before, moves only when pushed."""
-    y = np.empty_like(u)
-    for i in range(u.shape[0]):
-        held = min(max(held, u[i] - half), u[i] + half)
-        y[i] = held
-    return y
 
 
 def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
     """Inlets of the given ends: sticking, then overlap."""
 
     def opened(u: NDArray[np.float64], held: Memory) -> tuple[NDArray[np.float64], Memory]:
-        moved = _played(np.ascontiguousarray(u), values[1], u[0] if held is None else held)
+        moved = played(np.ascontiguousarray(u), values[1], u[0] if held is None else held)
         return np.maximum(moved - values[0], 0.0), float(moved[-1])
 
     commands, memory = by_column(opened, inputs.commands, ends.columns, memory)
@@ -44,8 +29,18 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_air",),
     parameters=(
-        EffectParameter("overlap_area", "m2", 0.0, 1e-6, 6e-8, size=True),
-        EffectParameter("sticking_area", "m2", 0.0, 5e-7, 4e-8, size=True),
+        EffectParameter(
+            "overlap_area", "m2", 0.0, 1e-6, 6e-8, size=True, meaning="command below which the inlet stays shut"
+        ),
+        EffectParameter(
+            "sticking_area",
+            "m2",
+            0.0,
+            5e-7,
+            4e-8,
+            size=True,
+            meaning="half the change of command that the spool ignores",
+        ),
     ),
     inputs=inputs,
     guide=Guide(

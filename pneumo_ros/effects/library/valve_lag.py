@@ -24,8 +24,10 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_air",),
     parameters=(
-        EffectParameter("valve_lag", "s", 0.0, 0.15, 0.012, size=True, starts=(0.04,)),
-        EffectParameter("valve_damping_ratio", "1", 0.3, 2.0, 0.8),
+        EffectParameter(
+            "valve_lag", "s", 0.0, 0.15, 0.012, size=True, starts=(0.04,), meaning="time constant of the inlet valve"
+        ),
+        EffectParameter("valve_damping_ratio", "1", 0.3, 2.0, 0.8, meaning="below 1 the spool overshoots"),
     ),
     derived=(Derived("valve_total_lag", "s", lambda p: 2.0 * p[1] * p[0]),),  # of a slow signal
     inputs=inputs,

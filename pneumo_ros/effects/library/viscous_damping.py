@@ -29,8 +29,17 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     parameters=(
-        EffectParameter("added_damping", "N s/m", -60.0, 500.0, 25.0, size=True, starts=(-20.0,)),
-        EffectParameter("growth_with_speed", "s/m", -2.0, 20.0, 0.5),
+        EffectParameter(
+            "added_damping",
+            "N s/m",
+            -60.0,
+            500.0,
+            25.0,
+            size=True,
+            starts=(-20.0,),
+            meaning="damping beyond the nominal one",
+        ),
+        EffectParameter("growth_with_speed", "s/m", -2.0, 20.0, 0.5, meaning="how it grows, or falls, with the speed"),
     ),
     term=PlantTerm(force=force),
     guide=Guide(
