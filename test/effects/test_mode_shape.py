@@ -25,15 +25,16 @@ def on_both(middle: float, rate: float, z: tuple[float, float], p: mode.Values) 
 
 
 def test_at_rest_each_plate_carries_half_of_the_weight() -> None:
-    assert on_both(0.1, 0.0, (0.1, 0.0), (0.3, 12.0, 0.05, 4.0)) == pytest.approx((-2.0, -2.0))
+    assert on_both(0.1, 0.0, (0.1, 0.0), (0.3, 12.0, 0.05, 4.0, 0.5)) == pytest.approx((-2.0, -2.0))
 
 
-def test_what_the_plates_feel_is_the_momentum_that_the_part_loses() -> None:
-    p = (0.3, 12.0, 0.05, 0.0)
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_what_the_plates_feel_is_the_momentum_that_the_part_loses_but_for_the_grounds(share: float) -> None:
+    p = (0.3, 12.0, 0.05, 0.0, share)
     tyre = Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02)
     shaken = 2.0 * math.pi * 4.0  # rad/s
     before, impulse = 0.01 * shaken, 0.0
-    z = mode.start(strut_at(0.0, before), AIR, tyre, p)
+    z = first = mode.start(strut_at(0.0, before), AIR, tyre, p)
     for i in range(4700):
         middle, rate = 0.01 * math.sin(shaken * i * STEP), 0.01 * shaken * math.cos(shaken * i * STEP)
         later = mode.advance(z, strut_at(middle, rate), AIR, tyre, STEP, p)
@@ -41,5 +42,6 @@ def test_what_the_plates_feel_is_the_momentum_that_the_part_loses() -> None:
         z = later
         assert body == pytest.approx(axle)
         impulse += (body + axle) * STEP
-    assert abs(p[0] * (z[1] - before)) > 0.01  # or nothing was asked
-    assert impulse == pytest.approx(-p[0] * (z[1] - before), rel=0.02)
+    ground = 2.0 * p[2] * (2.0 * math.pi * p[1]) * share * (z[0] - first[0])
+    assert abs(z[1] - before) > 0.03 and abs(ground) >= 0.05 * share  # or nothing was asked
+    assert impulse == pytest.approx(-p[0] * (z[1] - before + ground), rel=0.02)

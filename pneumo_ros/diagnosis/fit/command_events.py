@@ -18,7 +18,7 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, level
 
 # prior sigma of a lead, samples: a lead costs something, so that jumps nothing depends on stay where the log has them
 # [taste]
@@ -57,7 +57,7 @@ def timed(logged: Problem, current: Problem, best: Fit) -> Problem:
     if not isinstance(model, HasEvents) or best.diverged or best.jacobian is None:
         return current
     rows = current.fitted
-    if float(np.mean(best.residual[rows] ** 2)) > TOO_COARSE:
+    if level(best.residual[rows]) > TOO_COARSE:
         return current
     listed = [model.events(record) for record in logged.records]
     count = sum(len(events) for events in listed)
@@ -68,13 +68,14 @@ def timed(logged: Problem, current: Problem, best: Fit) -> Problem:
     records = tuple(model.advanced(r, e, x) for r, e, x in zip(logged.records, listed, split, strict=True))
     moved = replace(logged, records=records)
     after = fit(moved, best.candidate, x, best.jacobian, iterations=3)
-    return moved if np.mean(after.residual[rows] ** 2) < WORTH * np.mean(best.residual[rows] ** 2) else current
+    return moved if level(after.residual[rows]) < WORTH * level(best.residual[rows]) else current
 
 
 def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> tuple[Array, Array]:
     """Bounded least squares for all leads and, with them, the candidate's own unknowns."""
     model = problem.model
     assert isinstance(model, HasEvents) and best.jacobian is not None
+    left = np.sqrt(np.maximum(1.0, np.mean(best.residual**2, axis=0)))
     columns = []
     for k, events in enumerate(listed):
         for event in events:
@@ -82,17 +83,15 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
             records[k] = model.advanced(records[k], [event], np.ones(1))
             one = replace(problem, records=tuple(records))
             # Measurements and weights stay: only the prediction of this log moves.
-            columns.append(
-                ((problem.measured - one.predict(best.candidate, best.x)) * problem.weight - best.residual).ravel()
-            )
+            there = (problem.measured - one.predict(best.candidate, best.x)) * problem.weight
+            columns.append(((there - best.residual) / left).ravel())
     T = np.array(columns).T
-    J = best.jacobian.reshape(T.shape[0], -1)
+    J = (best.jacobian / left[:, None]).reshape(T.shape[0], -1)
     A = np.concatenate([T, J], axis=1)
-    prior = np.concatenate([np.full(T.shape[1], PRIOR_STD**-2), np.full(J.shape[1], 1.0)])
-    prior[T.shape[1] + problem.fixed :] = 1e-9
-    strength = 1.0 / (problem.pace.correlation * max(1.0, float(np.mean(best.residual**2))))
-    H = strength * A.T @ A + np.diag(prior)
-    g = strength * A.T @ best.residual.ravel()
+    prior = np.concatenate([np.full(T.shape[1], PRIOR_STD**-2), problem.prior(best.candidate)])
+    strength = 1.0 / problem.pace.correlation
+    H = strength * A.T @ A + np.diag(prior + 1e-9)  # an effect may have no prior, and move nothing
+    g = strength * A.T @ (best.residual / left).ravel()
     low = np.concatenate([np.zeros(T.shape[1]), np.full(J.shape[1], -np.inf)])
     high = np.concatenate([np.ones(T.shape[1]), np.full(J.shape[1], np.inf)])
     move = bounded_newton(H, g, low, high)

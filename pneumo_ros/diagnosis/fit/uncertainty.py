@@ -10,12 +10,13 @@ import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.fit.solver import Fit, mean_squares
 from pneumo_ros.diagnosis.model import parameters_at
 from pneumo_ros.diagnosis.result import Estimate
 from pneumo_ros.diagnosis.traits import HasDerived
 from pneumo_ros.effects.parameters import EffectParameter, family_of, is_law
 
+FAINTEST: Final = 1e-14  # curvature of the scaled unknowns below which rounding decides [numerics]
 LONGEST: Final = 60  # fit samples over which the residual's correlation is summed [numerics]
 TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
 # Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
@@ -26,7 +27,7 @@ NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size mus
 
 
 def covariance(problem: Problem, fit: Fit, absent: bool = False) -> Array:
-    """Covariance of the scaled unknowns: curvature of the data over the residual's own size and correlation, and prior.
+    """Covariance of the scaled unknowns: curvature of the data over what each channel leaves, correlation, and prior.
 
     An unknown at its bound does not vary; with ``absent`` sizes do that ended at none: for a curve, whose atoms might
     as well be there. Sensitivities are true to :data:`TRUE_TO` of themselves: a direction that moves the outputs by
@@ -37,15 +38,18 @@ def covariance(problem: Problem, fit: Fit, absent: bool = False) -> Array:
     prior = np.where(np.arange(len(fit.x)) < problem.fixed, 1.0, 1e-9)
     if absent:
         sizes = [False] * problem.fixed + [p.size for p in problem.effect_parameters(fit.candidate)]
-        free = free | (np.array(sizes) & (np.abs(fit.x) < UNUSED))
+        free = free | (np.array(sizes, dtype=bool) & (np.abs(fit.x) < UNUSED))
         prior = np.maximum(problem.prior(fit.candidate), 1e-9)
-    J = fit.jacobian[:, :, free].reshape(fit.residual.size, int(free.sum()))
-    strength = 1.0 / (correlation_time(fit.residual) * max(1e-3, float(np.mean(fit.residual**2))))
-    size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
+    left = np.sqrt(mean_squares(fit.residual))  # as the cost weighs the channels
+    J = (fit.jacobian[:, :, free] / left[:, None]).reshape(fit.residual.size, int(free.sum()))
+    strength = 1.0 / correlation_time(fit.residual)
+    size = np.sqrt(np.sum(J**2, axis=0) + prior[free])
     values, vectors = np.linalg.eigh((J / size).T @ (J / size))
-    known = (vectors * np.maximum(values - len(size) * TRUE_TO**2, 0.0)) @ vectors.T * np.outer(size, size)
+    known = (vectors * np.maximum(values - len(size) * TRUE_TO**2, 0.0)) @ vectors.T
+    # By its own directions: an inverse of what neither data nor prior hold may have variances below zero.
+    values, vectors = np.linalg.eigh(strength * known + np.diag(prior[free] / size**2))
     out = np.zeros((len(fit.x), len(fit.x)))
-    out[np.ix_(free, free)] = np.linalg.inv(strength * known + np.diag(prior[free]))
+    out[np.ix_(free, free)] = (vectors / np.maximum(values, FAINTEST)) @ vectors.T / np.outer(size, size)
     return out
 
 
@@ -125,9 +129,9 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     """How many parameters of its effects, or of some parts, ended at an end of their allowed range: of laws and of
     sizes, and of those that only bend a shape.
 
-    A size counts whole: nothing of the kind is so large. What only shapes a law counts half, another law may bend it;
-    and so does a law's size beside its family's shape, which can do the same and may push it anywhere. What shapes a
-    law beside that does not count: nothing is asked of it that the shape cannot do.
+    A size counts whole: nothing of the kind is so large. What only shapes a law counts half, however much of it,
+    because another law may bend it; and so does a law's size beside its family's shape, which can do the same and may
+    push it anywhere. What shapes a law beside that does not count: nothing is asked of it that the shape cannot do.
     """
     free, values = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x)
     first, firm, bent = 0, 0.0, 0.0
@@ -139,14 +143,15 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
             continue
         law, sizes = is_law(part[0]), sum(p.size for p in stuck)
         beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-        firm += sizes * (0.5 if beside else 1.0) + (0.5 * (len(stuck) - sizes) if law and not beside else 0.0)
+        firm += sizes * (0.5 if beside else 1.0) + (0.5 if law and not beside and len(stuck) > sizes else 0.0)
         bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
     return firm, bent
 
 
 def _natural(parameter: EffectParameter, value: float) -> bool:
-    """Whether a value is a natural end of its law: a part that is absent, a share that is whole."""
-    return any(abs(value - end) <= 1e-9 * abs(parameter.typical) for end in parameter.ends)
+    """Whether a value at a bound is at a natural end of its law: a part that is absent, a share that is whole."""
+    bound = min(parameter.low, parameter.high, key=lambda one: abs(value - one))
+    return any(abs(bound - end) <= 1e-9 * abs(parameter.typical) for end in parameter.ends)
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:

@@ -15,7 +15,7 @@ from pneumo_ros.diagnosis.search.selection import ALIKE, LAW_SHARE, Scored, stan
 SAME: Final = 0.1  # relative difference of selection scores that is no difference [taste]
 POSSIBLE: Final = 0.05  # probability from which an effect is not excluded [taste]
 # Difference of log mean squares, forms of laws added, that tells nothing [calibration: set 0.4, opened]
-AS_GOOD: Final = 0.15
+AS_GOOD: Final = 0.3
 MOST: Final = 0.8  # share of the fall of mean square that a rival must bring as well [taste]
 # Degrees between the trajectories of two effects, nuisance parameters answered, below which they are alike [taste]
 ANGLE: Final = 8.0

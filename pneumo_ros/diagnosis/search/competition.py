@@ -38,7 +38,7 @@ from pneumo_ros.diagnosis.search.screening import (
     trials,
     visibility,
 )
-from pneumo_ros.diagnosis.search.selection import ALIKE, FORM, LAW_SHARE, Thresholds, noise_level, score
+from pneumo_ros.diagnosis.search.selection import FORM, Thresholds, noise_level, score
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.errors import InputError
@@ -47,6 +47,9 @@ from pneumo_ros.errors import InputError
 LOPSIDED: Final = (0.1, 0.6)
 # Share of the fall that a second effect must bring: if less could be gained, none is looked for [taste]
 NOT_EVIDENT: Final = 0.9
+# Mean square, sigma squared, that a single with its shape may leave for no pairs to be looked for [numerics]
+SUFFICES: Final = 1.0
+SUFFICES_OF_REFIT: Final = 0.05  # the same beside it, as a share (rms) of what the refit leaves [numerics]
 SHAPED: Final = 3  # leading singles that are fitted with their shapes [numerics]
 PROBED: Final = 45  # singles that are probed, of some seventy that move anything [numerics]
 RIVALS: Final = 3  # other families at the leading single's place that are fitted with their shapes [numerics]
@@ -70,7 +73,7 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     search.progress(0.55, "shapes")
     leading = [with_shapes(search.problem, one) for one in search.singles[:SHAPED]]
     search.structures = [*leading, *_rivals_of_first(search)]
-    if pairs and search.singles and room_for_more(search) and not _as_laws_leave(search):
+    if pairs and search.singles and room_for_more(search) and not _one_suffices(search):
         _run_pairs(search)
         _time_jumps(search)
     return search
@@ -103,12 +106,12 @@ def room_for_more(search: Search) -> bool:
     return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
 
 
-def _as_laws_leave(search: Search) -> bool:
-    """Whether a single with its family's shape leaves no more than laws of the right kind do: what a second effect may
-    add to it is found beside it, and no pairs are looked for.
+def _one_suffices(search: Search) -> bool:
+    """Whether a single with its family's shape leaves little enough: what a second effect may add to it is found beside
+    it, and no pairs are looked for.
     """
     problem = search.problem
-    enough = ALIKE + LAW_SHARE**2 * score(problem, search.refit).level
+    enough = SUFFICES + SUFFICES_OF_REFIT**2 * score(problem, search.refit).level
     return min((score(problem, one).level for one in search.finalists), default=np.inf) < enough
 
 

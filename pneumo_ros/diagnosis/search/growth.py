@@ -19,8 +19,19 @@ from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
 from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
-from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, advantage, score, select
+from pneumo_ros.diagnosis.search.selection import (
+    SAME,
+    Scored,
+    Thresholds,
+    advantage,
+    by_families,
+    likeliest,
+    log_weight,
+    score,
+    select,
+)
 from pneumo_ros.diagnosis.search.state import Search
+from pneumo_ros.effects.parameters import family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
@@ -32,6 +43,10 @@ MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 # Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
 STEP: Final = 0.3
 EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
+PASSES: Final = 2  # over the effects of the best structure, exchanging each; the second where the first did [numerics]
+RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
+CLOSE: Final = 12.0  # log weight that a structure of other families may be behind to be fitted to the end [numerics]
+ENDED: Final = 3  # structures of as many effects that are fitted to the end [numerics]
 IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without being missed [taste]
 
 
@@ -45,6 +60,7 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
         best = _selected(search, limits)
     if best.size > 1:
         _refine(search, best, limits)
+        _end(search, _selected(search, limits))
     best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
@@ -142,12 +158,13 @@ def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
 def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
     """Each effect of the best structure against its rivals of the same place, and against its absence."""
     problem, found = search.problem, best.fit
-    for law in found.candidate.laws:
-        own = of_law(found.candidate, law)
-        bare = reduced(problem, found, own, iterations=2)
-        if bare.diverged:
-            continue
-        found = _exchanged(search, found, bare, law)
+    for _ in range(PASSES):
+        before = found
+        for law in found.candidate.laws:
+            bare = reduced(problem, found, of_law(found.candidate, law), iterations=2)
+            found = found if bare.diverged else _exchanged(search, found, bare, law)
+        if found is before:
+            break
     for law in found.candidate.laws:
         if len(found.candidate.laws) < 2:
             break
@@ -159,18 +176,33 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
         search.structures.append(found)
 
 
+def _end(search: Search, best: Scored) -> None:
+    """Fit the likeliest structures of as many effects to the end: what short fits leave is no difference of laws."""
+    problem = search.problem
+    scored = [score(problem, one) for one in search.finalists]
+    groups = by_families([one for one in scored if one.size == best.size]).values()
+    refit = score(problem, search.refit)
+    leading = sorted((group[0] for group in groups), key=lambda one: -log_weight(one, refit))[:ENDED]
+    for one in leading:
+        if len(leading) > 1 and log_weight(one, refit) > log_weight(leading[0], refit) - CLOSE:
+            old = one.fit
+            search.structures.append(fit(problem, old.candidate, old.x, old.jacobian, iterations=search.effort.long))
+
+
 def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
-    """The structure with one effect exchanged for the best rival of its place, where that is the better one."""
+    """The likeliest of a structure and those with one effect exchanged for the best rivals of its place: the one that
+    the probes prefer and, because these see laws without their shapes, the one that the screening does, or the next.
+    """
     problem, effort = search.problem, search.effort
     bare = refreshed(problem, bare)
     rivals = [part for part in _compatible(problem, bare.candidate.laws) if rival(problem, law, part)]
     screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
-    for short in short_fits(search, bare, probed(problem, bare, screened)[:1], (0.9, 0.9)):
-        other = with_shapes(problem, short)
-        search.structures.append(other)  # the worse one as well: it may be as likely
-        if score(problem, other).price < score(problem, found).price:
-            return other
-    return found
+    ranked = probed(problem, bare, screened)
+    promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
+    chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
+    others = [with_shapes(problem, short) for short in short_fits(search, bare, chosen, (0.9, 0.9))]
+    search.structures += others  # the worse ones as well: they may be as likely
+    return likeliest(score(problem, search.refit), [score(problem, one) for one in (found, *others)]).fit
 
 
 def _without_idle_shapes(search: Search, found: Fit) -> Fit:

@@ -11,6 +11,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import restricted
+from pneumo_ros.diagnosis.search.screening import candidate_scores, trials
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
 SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
@@ -28,29 +29,41 @@ def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fi
 def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
     """Shapes of the families of a structure, where its laws act."""
     named = ((f"{family_of(effect)}.{SHAPE}", site) for effect, site in candidate.laws)
-    return tuple(dict.fromkeys(part for part in named if part[0] in model.effects))
+    there = ((name, site) for name, site in named if name in model.effects and site in model.effects[name].sites)
+    return tuple(dict.fromkeys(there))
 
 
 def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
-    """A structure with further parts, which start at nothing."""
+    """A structure with further parts, which start at nothing; what is no size and has further starts (a frequency)
+    starts at the one that promises most.
+    """
     candidate = Candidate((*one.candidate.parts, *parts))
-    values = [*problem.values(one.candidate, one.x), *_beginnings(problem, one, parts)]
+    values = list(problem.values(one.candidate, one.x))
+    for part in parts:
+        values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
     start = problem.start(candidate, one.x[: problem.fixed], values)
     found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
     return found if found.cost < one.cost else one
 
 
-def _beginnings(problem: Problem, one: Fit, parts: Sequence[Part]) -> list[float]:
-    """Values of parts that do nothing yet: sizes zero, and whatever a law of the same family has found by that name."""
+def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:
+    """Start of a part whose law is not linear in all its parameters, by screening; nothing for others."""
+    if all(p.size or not p.starts for p in problem.parameters_of[part]):
+        return []
+    found = candidate_scores(problem, one, trials(problem, one, [part]))
+    return list(found[0].values) if found else []
+
+
+def _beginnings(problem: Problem, one: Fit, part: Part) -> list[float]:
+    """Values of a part that does nothing yet: sizes zero, and whatever a law of its family has found by that name."""
     own = iter(problem.values(one.candidate, one.x).tolist())
     found = {
-        (family_of(part[0]), part[1], p.name): next(own)
-        for part in one.candidate.parts
-        for p in problem.effect_parameters(Candidate((part,)))
+        (family_of(other[0]), other[1], p.name): next(own)
+        for other in one.candidate.parts
+        for p in problem.effect_parameters(Candidate((other,)))
     }
     return [
         0.0 if p.size else found.get((family_of(part[0]), part[1], p.name), p.typical)
-        for part in parts
         for p in problem.effect_parameters(Candidate((part,)))
     ]
 

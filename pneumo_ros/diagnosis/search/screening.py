@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, HUBER, Fit, robust_scale
+from pneumo_ros.diagnosis.fit.solver import Fit, level, weights
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.traits import IsScreened
 from pneumo_ros.effects.parameters import SHAPE, Active, EffectParameter, family_of, is_law
@@ -27,6 +27,11 @@ from pneumo_ros.effects.parameters import SHAPE, Active, EffectParameter, family
 SENSOR: Final = "sensor:"  # how the contract's places of sensors begin [definition]
 # Share of the typical size of a second start: an effect may be saturated at its typical size already [taste]
 SMALL: Final = 0.15
+# Square of the relative difference at which two sensitivities are the same to their accuracy [numerics]
+SAME_COLUMN: Final = 1e-7
+# Times a trial's size up to which its line is followed: what the base's unknowns answer all but wholly would else
+# explain anything, by a size without measure [numerics]
+FOLLOWED: Final = 10.0
 
 
 @dataclass(frozen=True)
@@ -103,10 +108,14 @@ def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[
     out: list[tuple[tuple[Part, ...], tuple[float, ...]]] = [((part,), values) for values in start_values(own)]
     shape = (f"{family_of(part[0])}.{SHAPE}", part[1])
     effect = problem.model.effects.get(shape[0])
-    if isinstance(effect, IsScreened):
+    if isinstance(effect, IsScreened) and is_law(part[0]):
         still, atoms = [0.0 if p.size else p.typical for p in own], problem.parameters_of[shape]
         for k in effect.screened:
-            out.append(((part, shape), (*still, *(p.typical if m == k else 0.0 for m, p in enumerate(atoms)))))
+            alone = [p.typical if m == k or not p.size else 0.0 for m, p in enumerate(atoms)]
+            out.append(((part, shape), (*still, *alone)))
+            for m, p in enumerate(atoms):
+                if not p.size:
+                    out += [((part, shape), (*still, *alone[:m], value, *alone[m + 1 :])) for value in p.starts]
     return out
 
 
@@ -193,24 +202,27 @@ def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) 
     assert base.jacobian is not None
     rows = problem.fitted
     r = base.residual[rows]
-    limit = HUBER * robust_scale(r)
-    root = np.sqrt(np.minimum(1.0, limit / np.maximum(np.abs(r), 1e-12)))
+    whole = level(r)
+    root = np.sqrt(weights(r) * whole)
     weighted = (r * root).ravel()
-    mean = float(np.mean(weighted**2))
-    strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + mean))
+    strength = 1.0 / (problem.pace.correlation * whole)
     low, high = problem.bounds(base.candidate)
     free = np.ones(len(base.x), dtype=bool)
     if held:
         free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
     J = (base.jacobian[rows][:, :, free] * root[:, :, None]).reshape(weighted.size, -1)
-    prior = np.where(np.arange(len(base.x)) < problem.fixed, 1.0, 1e-9)[free]
-    solve = np.linalg.inv(strength * (J.T @ J) + np.diag(prior))
+    prior = problem.prior(base.candidate)[free]
     if not found:
         return np.zeros((0, 0)), np.zeros(0), 1.0
     D = np.stack([(t.change[rows] * root).ravel() for t in found])
+    # A law and an atom of its shape may be the same column: scaled, with a floor, that is no division by nothing.
+    size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
+    J = J / size
+    curvature = J.T @ J + np.diag(prior / (strength * size**2) + SAME_COLUMN)
     DJ = D @ J
-    gram = D @ D.T - strength * DJ @ solve @ DJ.T
-    with_residual = D @ weighted - strength * DJ @ (solve @ (J.T @ weighted))
+    answers = np.linalg.solve(curvature, np.column_stack([DJ.T, J.T @ weighted]))
+    gram = D @ D.T - DJ @ answers[:, :-1]
+    with_residual = D @ weighted - DJ @ answers[:, -1]
     return gram, with_residual, float(weighted @ weighted)
 
 
@@ -218,8 +230,9 @@ def _explained_alone(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array,
     """What a multiple of each trial explains (zero where it would have to be negative and must not), the multiples
     (T, 1), and the trials' numbers (T, 1).
     """
-    size = b / np.maximum(np.diag(gram), 1e-12)
-    share = np.where((size > 0.0) | signed, b * size, 0.0)
+    own = np.maximum(np.diag(gram), 1e-12)
+    size = np.clip(b / own, -FOLLOWED, FOLLOWED)
+    share = np.where((size > 0.0) | signed, size * (2.0 * b - size * own), 0.0)
     return share, size[:, None], np.arange(len(b))[:, None]
 
 
@@ -231,7 +244,10 @@ def _explained_by_pairs(gram: Array, b: Array, signed: Mask) -> tuple[Array, Arr
     alike = cross**2 > 0.995**2 * first * second
     determinant = np.where(alike, 1.0, first * second - cross**2)
     sizes = np.column_stack([second * b[one] - cross * b[two], first * b[two] - cross * b[one]]) / determinant[:, None]
+    sizes = np.clip(sizes, -FOLLOWED, FOLLOWED)
     members = np.column_stack([one, two])
     allowed = ~alike & ((sizes > 0.0) | signed[members]).all(axis=1)
-    share = np.where(allowed, b[one] * sizes[:, 0] + b[two] * sizes[:, 1], 0.0)
+    u, v = sizes.T
+    curved = first * u * u + 2.0 * cross * u * v + second * v * v
+    share = np.where(allowed, 2.0 * (b[one] * u + b[two] * v) - curved, 0.0)
     return share, sizes, members

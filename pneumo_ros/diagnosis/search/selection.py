@@ -20,7 +20,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, robust_mean
+from pneumo_ros.diagnosis.fit.solver import Fit, level
 from pneumo_ros.diagnosis.fit.uncertainty import UNUSED
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.paths import share_file
@@ -28,11 +28,12 @@ from pneumo_ros.paths import share_file
 # Mean square, sigma squared, that is added to both levels compared: what model form leaves is no evidence [taste]
 FORM: Final = 0.5
 PARAMETER_PENALTY: Final = 4.0  # cost of each parameter, and of each effect that is claimed at both ends [taste]
+EVEN: Final = 1.0  # difference of prices that tells nothing: a fit may end that far from its minimum [taste]
 SAME: Final = 0.05  # relative difference of levels that counts as none, whatever the blocks say [taste]
 # Mean square, sigma squared, that laws of the right kind leave beside noise and their own share of the misfit: where
 # two families leave less, what is left does not tell them apart [calibration: set 0.4, opened]
-ALIKE: Final = 1.0
-LAW_SHARE: Final = 0.05  # of the refit's root mean square: what right laws leave [calibration: set 0.4, opened]
+ALIKE: Final = 0.6
+LAW_SHARE: Final = 0.01  # of the refit's root mean square: what right laws leave [calibration: set 0.4, opened]
 # Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
 # laws differ by more than chance does [calibration: development cases of 0.3]
 SHARPNESS: Final = 36.0
@@ -64,7 +65,7 @@ class Thresholds:
     second_share: float = 0.25
     alone: float = 2.5
     least: float = 0.06
-    model_form: float = 0.05
+    model_form: float = 0.01
 
 
 @lru_cache(maxsize=1)
@@ -98,11 +99,11 @@ class Scored:
     Attributes
     ----------
     fit : the candidate
-    level : mean square, sigmas
-    blocks : (B,) mean square of each selection block
+    level : mean square on the selection blocks, sigma squared, the geometric mean of the channels
+    blocks : (B,) the same of each block
     stretch : sum of squares of the nuisance parameters, in prior sigmas
     samples : effective number of fitted samples, what the training cost grows with
-    fitted : robust mean square of the fitted samples, sigmas
+    fitted : robust mean square of the fitted samples, in the same way
     strain : what the unknowns' prior adds to the training cost
     """
 
@@ -138,19 +139,24 @@ def used_unknowns(fit: Fit) -> int:
 
 
 def score(problem: Problem, fit: Fit) -> Scored:
-    """Mean squares on the selection blocks; samples that are missing do not count."""
+    """What is left on the selection blocks; samples that are missing do not count."""
     there = problem.weight > 0.0
     squares = np.where(there, fit.residual**2, 0.0)
     blocks = []
     for number in np.unique(problem.block[~problem.fitted]):
         rows = problem.block == number
-        blocks.append(squares[rows].sum() / max(1, there[rows].sum()))
-    values = np.array(blocks) if blocks else np.array([float(np.mean(squares))])
+        blocks.append(squares[rows].sum(axis=0) / np.maximum(1, there[rows].sum(axis=0)))
+    left = np.array(blocks) if blocks else np.mean(squares, axis=0)[None]
     stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
     samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
-    fitted = robust_mean(fit.residual[problem.fitted])
+    fitted = level(fit.residual[problem.fitted])
     strain = float((problem.prior(fit.candidate) * fit.x) @ fit.x)
-    return Scored(fit, float(np.mean(values)), values, stretch, float(samples), fitted, strain)
+    return Scored(fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, float(samples), fitted, strain)
+
+
+def _joined(squares: Array) -> Array:
+    """Geometric mean of the channels' mean squares (..., C), form added: as the cost counts them."""
+    return np.asarray(np.exp(np.mean(np.log(FORM + squares), axis=-1)) - FORM)
 
 
 def noise_level(problem: Problem) -> float:
@@ -172,7 +178,8 @@ def log_weight(one: Scored, refit: Scored) -> float:
 
 
 def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Scored]]:
-    """Structures of the same families, wherever these act, the one of lowest price first.
+    """Structures of the same families, wherever these act, the one of lowest price first; of those whose prices are
+    :data:`EVEN` the one that leaves least of the kept blocks.
 
     Laws of one family differ by what chance does: there the training cost counts in full, and what is left at a site
     that was not claimed is no matter of form.
@@ -180,6 +187,9 @@ def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Score
     groups: dict[frozenset[str], list[Scored]] = {}
     for one in sorted(structures, key=lambda s: s.price):
         groups.setdefault(frozenset(family_of(effect) for effect, _ in one.fit.candidate.laws), []).append(one)
+    for group in groups.values():
+        first = min((one for one in group if one.price < group[0].price + EVEN), key=lambda one: one.level)
+        group.sort(key=lambda one: one is not first)  # the others stay in their order
     return groups
 
 

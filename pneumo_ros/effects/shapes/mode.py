@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a moving part of the bellows may do beside the library's law: swing against the ground, and weigh.
 
-A part of mass m that hangs between both plates by springs: q'' = w^2 (h - q) + 2 zeta w (h' - q'), with h half-way
-between body and axle; each plate gets half of -m q'' and of what it weighs beyond the nominal masses. The law of
-:mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut, where its inertia pushes the plates
-apart; the real ones are anything between the two. No cone: frequency and damping are fitted as well.
+A part of mass m that hangs between both plates by springs: q'' = w^2 (h - q) + 2 zeta w ((1 - g) h' - q'), with h
+half-way between body and axle; each plate gets half of -m (w^2 (h - q) + 2 zeta w (1 - g) (h' - q')) and of what it
+weighs beyond the nominal masses. The share g of the damping is against the ground, the rest acts between part and
+plates. The law of :mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut, where its inertia
+pushes the plates apart; the real ones are anything between the two. No cone: frequency and damping are fitted as well.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -22,7 +23,7 @@ from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
 
 State = tuple[float, float]
-Values = tuple[float, float, float, float]
+Values = tuple[float, float, float, float, float]
 
 
 @njit(cache=True, error_model="numpy")
@@ -36,18 +37,19 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     """Exact damped oscillation about plates that move at held speed; half a step behind them, as every term."""
     w, zeta = 2.0 * math.pi * p[1], p[2]
     decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
-    e0, v0 = z[0] - (strut.middle - 0.5 * dt * strut.middle_rate), z[1] - strut.middle_rate
+    behind = -2.0 * zeta * p[4] * strut.middle_rate / w  # of the plates, at constant speed
+    e0, v0 = z[0] - (strut.middle - 0.5 * dt * strut.middle_rate) - behind, z[1] - strut.middle_rate
     c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
     e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
     v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
-    return (e1 + strut.middle + 0.5 * dt * strut.middle_rate, v1 + strut.middle_rate)
+    return (e1 + behind + strut.middle + 0.5 * dt * strut.middle_rate, v1 + strut.middle_rate)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _on_each(middle: float, rate: float, z: State, p: Values) -> float:
     """N upwards on each plate; ``middle`` between the plates, m, and its ``rate``, m/s."""
     w = 2.0 * math.pi * p[1]
-    return 0.5 * (p[0] * (w * w * (z[0] - middle) + 2.0 * p[2] * w * (z[1] - rate)) - p[3])
+    return 0.5 * (p[0] * (w * w * (z[0] - middle) + 2.0 * p[2] * w * (1.0 - p[4]) * (z[1] - rate)) - p[3])
 
 
 @njit(cache=True, error_model="numpy")
@@ -70,10 +72,12 @@ EFFECTS = (
         places=("{end}_force", "{end}_tyre"),
         parameters=(
             EffectParameter("hanging_mass", "kg", 0.0, 2.0, 0.15, size=True, spread=SPREAD),
-            EffectParameter("mode_frequency", "Hz", 3.0, 40.0, 15.0),
+            EffectParameter("mode_frequency", "Hz", 3.0, 40.0, 15.0, starts=(6.0, 9.0, 12.0, 20.0, 28.0)),
             EffectParameter("mode_damping_ratio", "1", 0.01, 0.25, 0.08),
             EffectParameter("weight", "N", -20.0, 20.0, 2.0, size=True, spread=SPREAD),
+            EffectParameter("ground_share", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0)),
         ),
         term=PlantTerm(states=2, start=start, advance=advance, force=force, tyre=tyre),
+        screened=(0,),
     ),
 )

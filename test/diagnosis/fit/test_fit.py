@@ -14,10 +14,11 @@ from pneumo_ros.diagnosis.diagnose import Options, diagnose
 from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
-from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
+from pneumo_ros.diagnosis.fit.solver import Fit, cost_of, fit, refreshed, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds, covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink, channel_gaps, free_run, total_gap
 from pneumo_ros.diagnosis.search.fitting import starts_elsewhere
+from pneumo_ros.diagnosis.search.parts import with_parts
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, trials, visibility
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -47,6 +48,17 @@ def test_refit_gives_back_what_the_log_was_made_with(model: RigModel) -> None:
     assert np.sqrt(np.mean(np.square(off))) < 2.5
 
 
+def test_what_is_wrong_with_one_sensor_does_not_drown_the_others() -> None:
+    """Halving what any channel leaves is worth the same, however much another one leaves."""
+    rng = np.random.default_rng(5)
+    left = rng.normal(size=(3000, 3)) * np.array([2.0, 2.0, 400.0])
+    every, x, prior = slice(None), np.zeros(0), np.zeros(0)
+    whole = cost_of(left, every, x, prior)
+    halved = [cost_of(left * np.where(np.arange(3) == k, 0.5, 1.0), every, x, prior) for k in range(3)]
+    # What is added to a mean square of 1 keeps its logarithm from falling all the way.
+    np.testing.assert_allclose(whole - np.array(halved), 3000 * 3 / 10 / 3 * np.log(4.0), rtol=0.03)
+
+
 def test_bounded_newton_stays_inside_and_is_optimal() -> None:
     rng = np.random.default_rng(0)
     A = rng.normal(size=(30, 6))
@@ -66,6 +78,32 @@ def test_screening_ranks_the_true_effect_first(model: RigModel) -> None:
     refit = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=6)
     ranked = candidate_scores(problem, refit, trials(problem, refit, all_parts(problem)))
     assert (("valve_lag", "rear"),) in [p.parts for p in ranked[:2]] and ranked[0].share > 0.8
+
+
+def test_a_law_beside_an_atom_that_is_the_same_does_not_spoil_the_screening(model: RigModel) -> None:
+    """A viscous tyre and the linear atom of its shape have one sensitivity twice: the rest is seen beside them."""
+    truth = Active("tyre_damping", "both", (12.0,)), Active("leak", "front", (3e-7, 0.0))
+    problem = Problem(model, (log(model, 1, drawn(model, 4, 0.5), truth),))
+    bare = Candidate((("tyre_damping", "both"),))
+    alone = fit(problem, bare, problem.start(bare, None, (12.0,)), iterations=4)
+    shaped = with_parts(problem, alone, (("tyre_damping.shape", "both"),), 4)
+    assert len(shaped.candidate.parts) == 2
+    base = refreshed(problem, shaped)
+    ranked = candidate_scores(problem, base, trials(problem, base, all_parts(problem)))
+    shares = {one.parts[0]: one.share for one in ranked}
+    assert shares["orifice_coefficient", "front"] > 0.3, "a leak, by another name"
+    assert shares["tyre_damping", "rear"] < 0.05, "the base does that itself"
+
+
+def test_a_shape_that_is_not_linear_starts_where_it_promises_most(model: RigModel) -> None:
+    """A fold that swings against the ground at 11 Hz, beside a law that has ended at 5 Hz."""
+    truth = Active("bellows_mode.shape", "both", (0.4, 11.0, 0.06, 0.0, 0.5))
+    problem = Problem(model, (log(model, 1, None, (truth,)),))
+    law = Candidate((("bellows_mode", "both"),))
+    alone = fit(problem, law, problem.start(law, None, (0.2, 5.0, 0.2, 0.5)), iterations=6)
+    shaped = with_parts(problem, alone, (("bellows_mode.shape", "both"),), 12)
+    frequency = problem.values(shaped.candidate, shaped.x)[5]
+    assert 9.5 < frequency < 12.5 and shaped.cost < 0.0 < 1000.0 < alone.cost
 
 
 def test_a_candidate_that_runs_away_loses_and_does_not_raise(model: RigModel) -> None:
@@ -93,6 +131,10 @@ def test_jumps_between_samples_are_timed(model: RigModel) -> None:
     assert moved is not problem
     again = fit(moved, Candidate(), best.x, best.jacobian)
     assert np.mean(again.residual**2) < 0.5 * np.mean(best.residual**2)
+    # Beside effects that move nothing, and of which nothing is known beforehand, as well.
+    idle = Candidate((("bump_stop", "front"),))
+    absent = problem.start(idle, best.x, (0.0, 0.004, 100.0, 0.2))
+    assert timed(problem, problem, fit(problem, idle, absent, best.jacobian, iterations=1)) is not problem
 
 
 def test_jumps_that_a_wrong_structure_misplaced_are_put_back(model: RigModel) -> None:
@@ -191,13 +233,33 @@ def test_other_shapes_and_signs_are_tried(model: RigModel) -> None:
     assert tried == [[0.08, 0.5, 0.5], [-0.0145, -0.5, 1.2], [-0.0145, 1.65, 0.0]]
 
 
+def test_what_nothing_tells_apart_varies_together(model: RigModel) -> None:
+    """A viscous tyre and the linear atom of its shape: each alone is unknown, no variance is below zero, and their sum
+    is known as well as the law alone would be.
+    """
+    problem = Problem(model, (log(model, 1, None, (Active("tyre_damping", "both", (12.0,)),)),))
+
+    def spread(parts: tuple[tuple[str, str], ...], sizes: list[float]) -> np.ndarray:
+        candidate = Candidate(parts)
+        found = fit(problem, candidate, problem.start(candidate, None, sizes), iterations=3)
+        return covariance(problem, sensitivities(problem, found))
+
+    law, shape = ("tyre_damping", "both"), ("tyre_damping.shape", "both")
+    alone, k = spread((law,), [12.0])[-1, -1], problem.fixed
+    atoms = problem.effect_parameters(Candidate((shape,)))
+    both = spread((law, shape), [6.0, 6.0, *(0.1 * p.typical for p in atoms[1:])])
+    assert np.diag(both).min() >= 0.0 and both[k, k] > 1e4 * alone
+    assert both[k : k + 2, k : k + 2].sum() == pytest.approx(alone, rel=0.3)
+
+
 @pytest.mark.parametrize(
     ("effect", "values", "bounded"),
     [
         ("bump_stop", (2e4, 0.004, 0.0, 0.0), 0),  # a stop without hardening or loss
-        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 1.0),
+        ("bump_stop", (2e4, 0.014, 100.0, 2.0), 0.5),  # two that shape it
         ("bellows_mode", (0.2, 12.0, 0.08, 1.0), 0),  # all of the damping is the wall's own
         ("bellows_mode", (2.0, 40.0, 0.08, 1.0), 1.5),  # its size, and its frequency
+        ("bellows_mode", (1e-6, 12.0, 0.08, 0.5), 0),  # nothing, but for where the fit ended
     ],
 )
 def test_natural_ends_of_a_law_are_no_bounds(
@@ -211,5 +273,5 @@ def test_natural_ends_of_a_law_are_no_bounds(
 def test_what_bends_a_shape_is_counted_by_itself_and_a_law_beside_it_half(model: RigModel) -> None:
     parts = (("bellows_mode", "front"), ("bellows_mode.shape", "front"))
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
-    x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0))
+    x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0, 0.5))
     assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (0.5, 1.0)

@@ -12,7 +12,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group, as_good
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
-from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge
+from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, told_probability
 from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, select
 
 CALM = HeldOutGaps(1.2, 1.1)
@@ -69,6 +69,22 @@ def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() 
     assert found.verdict == "leak" and found.of("orifice_coefficient") > 0.01
     far = opinion(refit, orifice, scored(9.0, 1360.0, "leak", unknowns=32), held=HeldOutGaps(20.0, 1.4))
     assert far.verdict == "orifice_coefficient" and far.of("leak") < 1e-3
+
+
+def test_of_laws_that_cost_as_much_the_kept_blocks_choose() -> None:
+    """Two laws of friction whose fits end a tenth apart, one of them in a local minimum that the kept blocks see."""
+    refit, stuck = scored(380.0, 3000.0), scored(2.93, -600.1, "coulomb_friction.presliding")
+    right = scored(0.25, -600.0, "coulomb_friction.soft")
+    assert select(refit, [stuck, right], LIMITS) is right
+    assert select(refit, [scored(2.93, -605.0, "coulomb_friction.presliding"), right], LIMITS) is not right
+
+
+def test_how_many_effects_is_judged_by_the_cost() -> None:
+    """A second effect that only one of six sensors sees lowers the mean a little and the cost by far: it stands."""
+    refit, one = scored(800.0, 4000.0), scored(1.6, -100.0, "leak", unknowns=40)
+    two = scored(0.88, -480.0, "leak", "pressure_scale", unknowns=52)
+    found = opinion(refit, one, two, held=HeldOutGaps(20.0, 1.4))
+    assert found.verdict == "leak+pressure_scale" and found.probability > 0.9
 
 
 @pytest.mark.parametrize(("beside", "named"), [(0.6, True), (0.05, False)])
@@ -213,3 +229,14 @@ def test_both_ends_are_claimed_only_where_both_were_seen() -> None:
     for cost, site in ((-780.0, "rear"), (-790.0, "both")):
         both = scored(0.25, cost, "bump_stop", site="both")
         assert select(refit, [both, rear], LIMITS).fit.candidate.parts == (("bump_stop", site),)
+
+
+def test_a_certain_credit_is_told_as_often_as_such_were_right_and_a_half_stays_a_half() -> None:
+    c = Calibration()
+    assert told_probability(1.0, 10.0, 1.0, c) == pytest.approx(0.93, abs=0.001)
+    assert told_probability(1.0, 0.0, 1.0, c) == told_probability(1.0, -0.3, 1.0, c) == 0.58
+    assert told_probability(1.0, 0.1, 1.0, c) == pytest.approx(0.5 * (0.93 + 0.58))
+    assert [told_probability(0.5, share, acts, c) for share in (0.0, 1.0) for acts in (0.0, 1.0)] == [0.5] * 4
+    assert told_probability(0.0, 1.0, 1.0, c) == 0.45 and told_probability(0.0, 1.0, 0.0, c) == 0.0
+    steps = [told_probability(p, 0.2, 0.9, c) for p in np.linspace(0.0, 1.0, 51)]
+    assert np.all(np.diff(steps) > 0.0)
