@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exact discrete forms of lags and delays for held and for linearly interpolated signals.
+"""Exact discrete forms of lags and delays for held and for linearly interpolated signals, and play.
 
 Each takes a block of samples and what the block before it left (None before the first), and gives the filtered block
 with what it leaves itself: a whole record at once, or one sample at a time, are the same numbers.
@@ -10,6 +10,7 @@ a, b : the filter's two states
 u, following, last : input: the block (N,) or one sample, the next one, the one before the block
 fresh : nothing was filtered yet: the filter rests at the first sample
 A, B0, B1, C, D : of :class:`_Form`
+half, held : half the width of a play, and where its follower was; in the input's unit
 """
 
 from __future__ import annotations
@@ -131,3 +132,13 @@ def delayed_hold(u: Array, period: float, delay: float, memory: Array | None = N
     part = delay / period - whole
     padded = np.concatenate([np.full(whole + 1, u[0]) if memory is None else memory, u])
     return (1.0 - part) * padded[1 : 1 + len(u)] + part * padded[: len(u)], padded[len(u) :]
+
+
+@njit(cache=True)
+def played(u: Array, half: float, held: float) -> Array:
+    """Backlash: the follower (N,) moves only when pushed."""
+    y = np.empty_like(u)
+    for i in range(u.shape[0]):
+        held = min(max(held, u[i] - half), u[i] + half)
+        y[i] = held
+    return y

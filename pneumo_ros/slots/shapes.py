@@ -83,6 +83,7 @@ LIMITS = Row("limit", si.LIMITS, 3, "1", lambda m: 0.3)
 PLAYS = Row("play", si.PLAYS, 3, "1", lambda m: 0.3)
 LAGS = Row("lag", si.LAGS, 4, "1", lambda m: 0.3)
 DELAYS = Row("delay", si.DELAYS, 3, "1", lambda m: 0.3)
+CREEPS = Row("creep", si.CREEPS, 4, "{unit}", lambda m: 0.1 * m.travel, signed=True)
 
 FORCE_ROWS = (OUT, IN, LINEAR, SQUARES, LOADED, SLIDERS, BELOW, ABOVE, TOUCH, POWERS, FADING, STEADY)
 ROWS: dict[str, tuple[Row, ...]] = {
@@ -90,7 +91,7 @@ ROWS: dict[str, tuple[Row, ...]] = {
     "contact": (*FORCE_ROWS, CENTRE),
     "flow": (HOLE, OPENS, FLOWS, RELIEFS, DROOPS, HEATS, CONSTANT_FLOW),
     "input": (VALUES, CORNERS, LIMITS, PLAYS, LAGS, DELAYS),
-    "sensor": (VALUES, LIMITS, LAGS, DELAYS),
+    "sensor": (VALUES, LIMITS, LAGS, DELAYS, CREEPS),
 }
 _FORCE = {
     "coulomb_friction": (*OUT.columns(0, 4), *IN.columns(0, 4), *LOADED.columns(), *SLIDERS.columns(0, 3)),
@@ -118,5 +119,5 @@ CONES: dict[str, dict[str, tuple[int, ...]]] = {
     "input": {
         **_SIGNAL, "gain": VALUES.columns(1), "dead_zone": CORNERS.columns(), "backlash": PLAYS.columns(),
     },
-    "sensor": {**_SIGNAL, "scale": VALUES.columns(1)},
+    "sensor": {**_SIGNAL, "scale": VALUES.columns(1), "offset": CREEPS.columns()},
 }  # fmt: skip

@@ -3,19 +3,14 @@
 
 ``P`` are the values of all laws and atoms (0: absent), in the signal's unit, seconds or shares; ``S`` its scales. Whole
 logs pass at once: first what the value alone decides, then what takes time.
-
-Kernel arguments
-----------------
-u, half : (N,) signal, and half the width of its play, in one unit
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.filters import first_order_line
+from pneumo_ros.effects.filters import first_order_line, played
 
 # Laws: columns of P.
 GAIN, OFFSET, SQUARE, CUBE = 0, 1, 2, 3
@@ -30,21 +25,14 @@ LIMITS = CORNERS + 3  # what a limit at S_LIMITS takes away
 PLAYS = LIMITS + 3  # shares that pass a play of S_PLAYS
 LAGS = PLAYS + 3  # shares that pass a lag of S_LAGS
 DELAYS = LAGS + 4  # shares that are S_DELAYS late
-VALUES = DELAYS + 3
+CREEPS = DELAYS + 3  # what a zero that creeps in S_CREEPS ends at
+VALUES = CREEPS + 4
 
 # Scales.
 S_DEAD, S_LIMITS, S_PLAYS, S_LAGS, S_DELAYS = 0, 3, 6, 9, 13
 S_MIDDLE, S_SWING, S_PEAK = 16, 17, 18
-SCALES = 19
-
-
-@njit(cache=True)
-def _played(u: Array, half: float) -> Array:
-    y, held = np.empty_like(u), u[0]
-    for i in range(u.shape[0]):
-        held = min(max(held, u[i] - half), u[i] + half)
-        y[i] = held
-    return y
+S_CREEPS = 19
+SCALES = 23
 
 
 def lagged(u: Array, period: float, lag: float) -> Array:
@@ -87,7 +75,7 @@ def passed(u: Array, period: float, P: Array, S: Array) -> Array:
 def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
     out = _static(u, P, S)
     if P[PLAY] != 0.0:
-        out = _played(out, P[PLAY])
+        out = played(out, P[PLAY], out[0])
     if P[LAG] != 0.0:
         out = lagged(out, period, P[LAG])
     if P[SECOND_LAG] != 0.0:
@@ -96,14 +84,24 @@ def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
         out = delayed(out, period, P[DELAY])
     shared = np.zeros_like(out)
     for first, count, scale, way in (
-        (PLAYS, 3, S_PLAYS, lambda s: _played(out, s)),
+        (PLAYS, 3, S_PLAYS, lambda s: played(out, s, out[0])),
         (LAGS, 4, S_LAGS, lambda s: lagged(out, period, s)),
         (DELAYS, 3, S_DELAYS, lambda s: delayed(out, period, s)),
     ):
         for k in range(count):
             if P[first + k] != 0.0:
                 shared += P[first + k] * (way(float(S[scale + k])) - out)
-    return np.asarray(out + shared)
+    return np.asarray(out + shared + _crept(len(u), period, P, S))
+
+
+def _crept(rows: int, period: float, P: Array, S: Array) -> Array:
+    """How far the zero has moved since the log began, from where it stood then."""
+    time = np.arange(rows) * period
+    crept = np.zeros(rows)
+    for k in range(4):
+        if P[CREEPS + k] != 0.0:
+            crept -= P[CREEPS + k] * np.expm1(-time / S[S_CREEPS + k])
+    return crept
 
 
 def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:
@@ -129,5 +127,6 @@ def scales_of(u: Array, period: float) -> Array:
     S[S_PLAYS : S_PLAYS + 3] = np.array([0.03, 0.12, 0.35]) * swing
     S[S_LAGS : S_LAGS + 4] = np.array([0.005, 0.02, 0.08, 0.3]) * period
     S[S_DELAYS : S_DELAYS + 3] = np.array([0.01, 0.04, 0.15]) * period
+    S[S_CREEPS : S_CREEPS + 4] = np.array([1.0, 4.0, 15.0, 60.0]) * period
     S[S_MIDDLE], S[S_SWING], S[S_PEAK] = 0.5 * (low + high), swing, peak
     return S

@@ -45,8 +45,10 @@ def written(folder: Path, physics: str = CART, names: str = CART_YAML) -> Path:
     return folder / "rig.py"
 
 
-def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1) -> Path:
-    """A log of the cart with dry friction that turns over within 2 mm/s."""
+def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1, creep: float = 0.0) -> Path:
+    """A log of the cart with dry friction that turns over within 2 mm/s, and a sensor whose zero creeps by so many m in
+    five seconds.
+    """
     t = np.arange(0.0, seconds, PERIOD)
 
     def pull(time: float) -> float:
@@ -58,6 +60,7 @@ def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1) 
 
     x = solve_ivp(rates, (0.0, t[-1]), (0.0, 0.0), t_eval=t, max_step=2e-3).y[0]
     x += np.random.default_rng(seed).normal(0.0, 2e-5, len(t))
+    x -= creep * np.expm1(-t / 5.0)
     table = np.column_stack([t, 1e3 * x, [pull(one) for one in t]])
     np.savetxt(path, table, "%.6f", ",", header="t,x,force", comments="")
     return path

@@ -101,6 +101,15 @@ def test_a_late_signal_is_late_and_a_limit_limits() -> None:
     assert np.abs(si.passed(u, 0.01, P, S)).max() == pytest.approx(0.7, abs=0.01)
 
 
+def test_a_zero_creeps_from_where_it_stood_to_its_end() -> None:
+    u = np.sin(np.linspace(0.0, 20.0, 4001))
+    S, P = si.scales_of(u, 0.5), np.zeros(si.VALUES)
+    P[si.CREEPS + 1] = 0.02  # in four of the slowest periods
+    crept = si.passed(u, 0.01, P, S) - u
+    assert crept[0] == 0.0 and crept[200] == pytest.approx(0.02 * (1.0 - np.exp(-1.0))) and crept[-1] > 0.0199
+    assert np.array_equal(si.undone(u, P, S), u), "what takes time is left"
+
+
 @pytest.mark.parametrize("slot", KINDS, ids=lambda s: s.kind)
 def test_every_cone_lies_in_the_ceiling_of_its_slot(slot: Slot) -> None:
     effects = effects_of([slot], {slot.place: MEASURES})

@@ -8,7 +8,7 @@ zero creeps from where it stood when the log began, by exponentials of every len
 
 Kernel arguments
 ----------------
-u, half, held : (N,) signal, half the width of its play, and where the follower stood before, in one unit
+u, held : (N,) signal, and where the follower stood before, in one unit
 up, down, most : share of the way that a follower goes in one sample, and how far it goes at most
 """
 
@@ -31,7 +31,7 @@ from pneumo_ros.effects.contract import (
     Values,
     by_column,
 )
-from pneumo_ros.effects.filters import delayed_hold, first_order_line, lagged_hold
+from pneumo_ros.effects.filters import delayed_hold, first_order_line, lagged_hold, played
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
 from pneumo_ros.rig.channels import DISPLACEMENTS
@@ -69,18 +69,9 @@ def _line(tau: float) -> Filter:
     return lambda u, period, memory: first_order_line(u, period, tau, memory)
 
 
-@njit(cache=True)
-def _played(u: Array, half: float, held: float) -> Array:
-    y = np.empty_like(u)
-    for i in range(u.shape[0]):
-        held = min(max(held, u[i] - half), u[i] + half)
-        y[i] = held
-    return y
-
-
 def _play(half: float) -> Filter:
     def passed(u: Array, period: float, memory: Memory) -> tuple[Array, Memory]:
-        y = _played(np.ascontiguousarray(u), half, float(u[0]) if memory is None else memory)
+        y = played(np.ascontiguousarray(u), half, float(u[0]) if memory is None else memory)
         return y, float(y[-1])
 
     return passed
