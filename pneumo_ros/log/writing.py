@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import struct
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -233,9 +234,13 @@ class LogWriter:
 
     def _drain(self) -> None:
         """Write in batches: a thread that woke for each message would fight the callbacks for the interpreter."""
-        while not self._finishing.wait(BATCH_PERIOD):
+        try:
+            while not self._finishing.wait(BATCH_PERIOD):
+                self._write_queued()
             self._write_queued()
-        self._write_queued()
+        except Exception as error:  # whatever ends this thread ends the log: it must not look complete
+            self._stopped = f"writing failed ({error!r}); the log ends here, control goes on"
+            raise
 
     def _write_queued(self) -> None:
         queue, add = self._queue, self._writer.add_message
@@ -243,12 +248,18 @@ class LogWriter:
             while queue:
                 channel, data, log_ns = queue.popleft()
                 self._total += 1
+                stepped = channel.number in self._steps
+                try:
+                    stamp = stamp_of(data) if stepped or log_ns == AT_STAMP else 0
+                except struct.error:  # any process may send bytes of whatever length
+                    self._disorder = self._disorder or f"a message of {channel.topic} ends before its stamp does"
+                    continue
                 if log_ns == AT_STAMP:
-                    log_ns = stamp_of(data)
+                    log_ns = stamp
                 elif log_ns == AT_LATEST:
                     log_ns = self._latest
                 self._latest = log_ns
-                if channel.number in self._steps and not self._in_order(channel, stamp_of(data)):
+                if stepped and not self._in_order(channel, stamp):
                     continue
                 if self._total % DISK_CHECK_EVERY == 1:
                     self._check_disk()

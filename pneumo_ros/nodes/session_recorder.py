@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.provenance import versions
-from pneumo_ros.log.topics import APPLIED, DIAGNOSTIC, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, STRING, TOPICS, Topic
+from pneumo_ros.log.topics import APPLIED, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, TOPICS, Topic
 from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
 from pneumo_ros.nodes.interfaces import message_class
@@ -31,6 +31,7 @@ DRAIN_LIMIT = 5.0  # s
 WATCH_PERIOD = 0.1  # s between looks whether the stamps written are in order
 QUIET_PERIOD = 0.3  # s without a message after which everything sent has arrived
 PARAMETER_EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent", "every parameter change", "")
+STAMPED = (JOINT, PRESSURE)  # types whose header says which sample they are of
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter("output", "session.mcap", "", "log file to write (.mcap)", read_only=True),
     Parameter("session", "{}", "", "what else explains the run, a JSON object of texts", read_only=True),
@@ -65,7 +66,7 @@ class SessionRecorderNode(RigNode):
     def _record(self, topic: Topic) -> None:
         offered = rosbag2_qos(publisher_qos(topic.flow, self.lockstep))
         channel = self.writer.add_topic(topic.name, topic.type, [offered], self._step(topic))
-        take = self._callback(channel, topic.type not in (STRING, PARAMETER_EVENTS.type))
+        take = self._callback(channel, topic.type in STAMPED)
         if topic is PARAMETER_EVENTS:  # absolute, and of every node of the domain
             kind, qos = message_class(topic.type), recorder_qos(topic.flow)
             self.create_subscription(kind, topic.name, self._of_this_namespace(take), qos, raw=True)
@@ -77,7 +78,7 @@ class SessionRecorderNode(RigNode):
 
         What reached the valves is stamped when it did, on a clock that is slewed; the others have a sample's stamp.
         """
-        if not topic.publisher or topic.type not in (JOINT, PRESSURE) or topic is APPLIED:
+        if not topic.publisher or topic.type not in STAMPED or topic is APPLIED:
             return None
         return self.period_ns if self.lockstep and topic in EVERY_PERIOD else 0
 
@@ -109,12 +110,12 @@ class SessionRecorderNode(RigNode):
         """What to do with a message of a channel.
 
         In lockstep a message is logged at its sample time, so that a session that ran at twenty times real time plays
-        back as it was; the health topics carry the computer's time and go to the sample they came with.
+        back as it was; those without a stamp and the health topics, which carry the computer's time, go to the sample
+        they came with.
         """
         if not self.lockstep:
             return lambda data: self.writer.write(channel, data, time.time_ns())
-        at_stamp = stamped and channel.topic not in (EVENTS.name, DIAGNOSTIC.name)
-        return self.writer.taker(channel, AT_STAMP if at_stamp else AT_LATEST)
+        return self.writer.taker(channel, AT_STAMP if stamped else AT_LATEST)
 
     def health_level(self) -> tuple[bytes, str]:
         """A warning once nothing is written any more."""

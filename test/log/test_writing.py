@@ -95,6 +95,26 @@ def test_log_times_sequence_and_bag_metadata(tmp_path: Path) -> None:
     assert files_of(tmp_path) == [tmp_path / "a.mcap"], "our own reader takes the folder too"
 
 
+def test_a_message_too_short_for_its_stamp_is_told_and_the_rest_written(tmp_path: Path) -> None:
+    """Another process may send anything under a topic's name."""
+    writer = LogWriter(tmp_path / "a.mcap")
+    road = writer.add_topic(topics.ROAD.name, topics.ROAD.type, step_ns=1)
+    for data in (sample(10**9), b"\x00\x01\x00\x00\x01", sample(10**9 + 1)):
+        writer.write(road, data, AT_STAMP)
+    assert writer.finish().counts == {topics.ROAD.name: 2}
+    assert writer.disorder == f"a message of {topics.ROAD.name} ends before its stamp does"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_whatever_ends_the_writing_the_log_is_not_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = LogWriter(tmp_path / "a.mcap")
+    road = writer.add_topic(topics.ROAD.name, topics.ROAD.type)
+    monkeypatch.setattr(writer._writer, "add_message", lambda *_: {}["no such key"])
+    writer.write(road, sample(10**9), AT_STAMP)
+    written = writer.finish()
+    assert not written.complete and "writing failed (KeyError('no such key'))" in written.reason
+
+
 def test_a_log_among_others_leaves_the_folder_alone(tmp_path: Path) -> None:
     """A folder's metadata.yaml is about one bag: a second log neither takes it over nor makes one where it must not."""
     for name, folder in (("run.mcap", True), ("rerun.mcap", True), ("residual.mcap", False)):

@@ -24,6 +24,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
 from pneumo_ros.log.comparison import same_payload
 from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.inspection import read_events
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.records import Records
 from pneumo_ros.log.rewriting import write_log
@@ -37,6 +38,7 @@ from helpers.sessions import own_domain  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
+from std_msgs.msg import Bool  # noqa: E402
 
 from pneumo_ros.nodes.base import StopRequest  # noqa: E402
 from pneumo_ros.nodes.controller import ControllerNode  # noqa: E402
@@ -95,6 +97,34 @@ def test_replay_gives_the_recorded_bytes(recorded: Log) -> None:
     for agreement in result.agreements:
         assert agreement.identical and agreement.compared == recorded.topics[agreement.topic].count, agreement
     assert recorded.topics["/rig/setup"].count > 5  # the change is in it, and took effect at the right sample
+
+
+def test_an_emergency_stop_in_lockstep_is_in_the_log_and_so_is_the_rest(tmp_path: Path, context: Context) -> None:
+    """Its message has no stamp of its own: it goes to the sample that it came with."""
+    path = tmp_path / "session.mcap"
+    nodes = [
+        RoadProfileNode(context, {"seed": 3}),
+        PlantNode(context, {"seed": 3, "duration": 2.0}),
+        EstimatorNode(context),
+        ControllerNode(context),
+        SessionRecorderNode(context, {"output": str(path)}),
+    ]
+    controller = nodes[3]
+    panel = controller.create_publisher(Bool, "/rig/estop", 1)
+
+    def press() -> None:
+        begun = controller.progress is not None and controller.progress.last_ns > 1_200_000_000
+        if begun and panel.get_subscription_count() == 3:  # two of the plant, the recorder
+            timer.cancel()
+            panel.publish(Bool(data=True))
+
+    timer = controller.create_timer(0.001, press)
+    assert spin(nodes, StopRequest(), context) == 0
+    for node in nodes:
+        node.destroy_node()
+    log = read_log(path)
+    assert log.topics["/rig/estop"].count == 1 and log.topics["/rig/displacement"].count == 1001
+    assert "estop" in [event.code for event in read_events(log)]
 
 
 def test_a_killed_recorders_log_replays_as_far_as_it_goes(recorded: Log, tmp_path: Path) -> None:
