@@ -38,8 +38,11 @@ from pneumo_ros.parameters import Value
 from pneumo_ros.rig import Rig, load_rig, parse_rig
 
 NODE_NAME = "dashboard"
+STOP = "emergency stop"
 QUIET = 1.5  # s without a sample after which the session is taken to be over or not there
 STOP_HEARD = 1.0  # s at most that closing waits for a stop to be acknowledged
+ASK_AGAIN = 0.5  # s between requests of a stop that nobody has confirmed
+CONFIRMATION = 10.0  # s after which a stop that nobody has confirmed is told
 TUNABLE = ("controller", "estimator")
 LOOK_PERIOD = 1.0  # s between looks for the parameters of a node that has not answered yet
 _ENDING = ("session_complete", "session_stopped", "node_died")
@@ -78,6 +81,8 @@ class LiveLink:
         )
         self._trip = self._node.create_client(Trigger, TRIP_SERVICE)
         self._reset = self._node.create_client(Trigger, RESET_SERVICE)
+        self._stop_asked: float | None = None  # monotonic s; None once it is confirmed or given up
+        self._node.create_timer(ASK_AGAIN, self._ask_for_stop_again)
         self._node.create_timer(LOOK_PERIOD, self._look_for_parameters)
         self._running = True
         self._thread = threading.Thread(target=self._spin, name="dashboard-link", daemon=True)
@@ -187,12 +192,15 @@ class LiveLink:
     # -- Controls --------------------------------------------------------------------------------------------------
 
     def estop(self) -> None:
-        """By topic, which needs no answer, and by service, which gives one."""
-        self._stop_topic.publish(Bool(data=True))
-        self._call(self._trip, "emergency stop")
+        """By topic, which needs no answer, and by service, which gives one; both again until that has come."""
+        if not self._trip.service_is_ready():
+            self._answers.append(f"{STOP}: sent by topic, no node offers the service yet")
+        self._stop_asked = time.monotonic()
+        self._ask_for_stop()
 
     def reset(self) -> None:
-        """Ask the owner of the valves to release the stop."""
+        """Ask the owner of the valves to release the stop; it is not asked for again then."""
+        self._stop_asked = None
         self._call(self._reset, "release")
 
     def parameters(self) -> Sequence[Control]:
@@ -220,16 +228,31 @@ class LiveLink:
             out.append(self._answers.popleft())
         return out
 
+    def _ask_for_stop(self) -> None:
+        self._stop_topic.publish(Bool(data=True))
+        if self._trip.service_is_ready():
+            self._trip.call_async(Trigger.Request()).add_done_callback(self._stop_confirmed)
+
+    def _stop_confirmed(self, future: Future[Any]) -> None:
+        if self._stop_asked is not None:  # the first answer to one press
+            self._stop_asked = None
+            self._answers.append(_answer(STOP, future))
+
+    def _ask_for_stop_again(self) -> None:
+        """A request or its answer may be lost, or come before the service was found; a stop must not be."""
+        if self._stop_asked is None:
+            return
+        if time.monotonic() - self._stop_asked > CONFIRMATION:
+            self._stop_asked = None
+            self._answers.append(f"{STOP}: nobody confirmed it within {CONFIRMATION:g} s; look at the valves")
+        else:
+            self._ask_for_stop()
+
     def _call(self, client: Any, what: str) -> None:
         if not client.service_is_ready():
-            self._answers.append(f"{what}: sent by topic only, no node offers the service")
+            self._answers.append(f"{what}: no node offers the service")
             return
-
-        def answered(future: Future[Any]) -> None:
-            result = future.result()
-            self._answers.append(f"{what}: {'done' if result.success else 'refused'}, {result.message}")
-
-        client.call_async(Trigger.Request()).add_done_callback(answered)
+        client.call_async(Trigger.Request()).add_done_callback(lambda f: self._answers.append(_answer(what, f)))
 
     def _look_for_parameters(self) -> None:
         for name, client in self._clients.items():
@@ -255,6 +278,11 @@ class LiveLink:
             _control(node, descriptors[name], parameter_value_to_python(value))
             for name, value in zip(wanted, values, strict=True)
         ]
+
+
+def _answer(what: str, future: Future[Any]) -> str:
+    result = future.result()
+    return f"{what}: {'done' if result.success else 'refused'}, {result.message}"
 
 
 def _control(node: str, descriptor: ParameterDescriptor, value: Value) -> Control:

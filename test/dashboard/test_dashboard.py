@@ -82,7 +82,7 @@ def served(*arguments: str, module: str = "pneumo_ros.cli.view") -> Iterator[tup
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            process.wait(20)
+            process.wait(60)  # a session writes its log and its report before it ends
         finally:
             process.kill()
 

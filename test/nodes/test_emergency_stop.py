@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
 from pneumo_ros.daq.actuation import Mode
+from pneumo_ros.nodes import dashboard_link
 from pneumo_ros.nodes.daq import DaqNode
 from pneumo_ros.nodes.dashboard_link import LiveLink
 from pneumo_ros.nodes.emergency_stop import RESET_SERVICE, TRIP_SERVICE
@@ -185,3 +186,29 @@ def test_a_dashboard_that_is_closed_in_the_middle_leaves_the_stop(bench: Bench) 
         link.estop()
     bench.until(lambda: node.operator.latch.found(), "the latch")
     bench.assert_stopped()
+
+
+def test_a_dashboard_that_was_pressed_before_there_was_a_service_gets_its_answer(bench: Bench) -> None:
+    """A press is asked for until it is confirmed, and told when nobody does."""
+    said: list[str] = []
+
+    def heard(what: str) -> bool:
+        said.extend(link.answers())
+        return any(what in one for one in said)
+
+    with LiveLink(bench.domain) as link:
+        link.estop()
+        assert heard("emergency stop: sent by topic, no node offers the service yet")
+        node = bench.start()
+        bench.until(lambda: heard("emergency stop: done"), "the confirmation")
+        assert node.operator.latch.found()
+        assert [one for one in said if "done" in one] == said[1:], "one press, one answer"
+
+
+def test_a_stop_that_nobody_confirms_is_told(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dashboard_link, "CONFIRMATION", 1.0)
+    said: list[str] = []
+    with LiveLink(bench.domain) as link:
+        link.estop()
+        bench.until(lambda: said.extend(link.answers()) or any("nobody confirmed" in one for one in said), "the word")
+    assert "look at the valves" in said[-1]
