@@ -69,6 +69,9 @@ def test_play_between_teeth_of_another_maker_is_named(tmp_path: Path) -> None:
     gearbox(tmp_path / "log.csv", 3)
     found = diagnosed("gearbox", tmp_path / "log.csv")
     assert "backlash" in found.verdict.split("+") and found.location[0][0] == "teeth"
+    assert found.gap.best < 0.15 * found.gap.refit
+    (play,) = (named for named in found.active if named.effect == "backlash")
+    assert play.values[1] == pytest.approx(0.1, rel=0.1)  # half the gap, rad
 
 
 @pytest.mark.slow

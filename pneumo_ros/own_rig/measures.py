@@ -2,7 +2,9 @@
 """Scales of a rig's slots, from its logs: what its rates and travels are, and what would be an evident size there.
 
 The nominal model is run in short windows, each from the log's own state, so that it stays near the data even where a
-free run would not. A size is evident that moves the outputs of such a window by four tenths of what the log moves.
+free run would not. A size is evident that moves the outputs of such a window by four tenths of what the log moves, or
+the slot's own travel by four tenths of what that moves: between parts that are tied to one another no force moves far
+what is measured.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from pneumo_ros.slots import signal as si
 from pneumo_ros.slots.kinds import Flow, Force, Slot
 from pneumo_ros.slots.laws import Measures
 
-EVIDENT = 0.4  # of a channel's standard deviation
+EVIDENT = 0.4  # of the standard deviation of a channel, or of the slot's travel
 WINDOWS = 12  # in a record, at most
 LARGE = 5.0  # evident sizes that friction may have before its turnover is widened
 SEARCHES = 12  # steps in the search of a size
@@ -123,13 +125,14 @@ class Scaler:
 
     def _evident(self, k: int, inside: Array, column: int) -> float:
         """Size of one value at a slot that moves the windows' outputs by :data:`EVIDENT` of what the log moves."""
-        base, size = self._run(None, inside), 1.0
+        base, size = self._run(None, inside, k), 1.0
+        spread = np.append(self.spread, np.std(base[:, -1]) or np.inf)
         for _ in range(SEARCHES):
             P = np.zeros((len(inside), VALUES))
             P[k, column] = size
             if isinstance(self.physics.inside[k], Force):
                 P[k, fo.ATOMS_AT_WORK] = float(column >= fo.LAWS)
-            change = (self._run(P, inside) - base) / self.spread
+            change = (self._run(P, inside, k) - base) / spread
             moved = float(np.max(np.sqrt(np.mean(change**2, axis=0))))
             if not np.isfinite(moved):
                 size *= 1e-3
@@ -141,12 +144,14 @@ class Scaler:
                 size *= float(np.clip(EVIDENT / moved, 1e-4, 1e4))
         return size
 
-    def _run(self, P: Array | None, inside: Array) -> Array:
-        """Outputs of all windows, one after the other."""
+    def _run(self, P: Array | None, inside: Array, k: int) -> Array:
+        """Outputs of all windows, one after the other, and a slot's travel (a flow's pressure) beside them."""
         slots = len(inside)
         on = np.zeros(slots, bool) if P is None else np.asarray(P.any(axis=1), dtype=bool)
         values = np.zeros((slots, VALUES)) if P is None else P
-        return np.vstack([self._one(w, on, values, inside)[0] for w in self.windows])
+        runs = [self._one(w, on, values, inside) for w in self.windows]
+        column = 0 if isinstance(self.physics.inside[k], Flow) else 1
+        return np.vstack([np.column_stack([seen, where[:, k, column]]) for seen, where, _ in runs])
 
     def _one(self, w: Window, on: Mask, P: Array, S: Array) -> tuple[Array, Array, Array]:
         return self.physics.kernel.run(w.state, w.record.inputs, self.held, self.period, self.substeps, self.nominal,

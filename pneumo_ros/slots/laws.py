@@ -164,7 +164,7 @@ FORCE_LAWS = (
     Law("offset", FORCES, "a constant force", (Knob("constant_force", N, fo.CONSTANT, _size, -MOST),)),
     Law("backlash", CONTACT, "play before the parts touch",
         (Knob("lost_stiffness", NM, fo.BACKLASH, _per_travel),
-         _shape("half_gap", M, fo.BACKLASH_HALF, lambda m: 0.1 * m.travel, 0.02, 9.0, (0.3, 3.0)))),
+         _shape("half_gap", M, fo.BACKLASH_HALF, lambda m: 0.1 * m.travel, 0.02, 12.0, (0.3, 3.0, 7.0)))),
     Law("lift_off", CONTACT, "parts that cannot pull", (Knob("lost_pull", "1", fo.PULL, lambda m: 1.0, 0.0, 1.0,
                                                              starts=(0.3,)),), needs_load=True),
 )  # fmt: skip

@@ -114,13 +114,26 @@ parameters: {stiffness: 200 N/m}
 """
 
 
-def test_a_rig_without_states_or_tolerances_is_diagnosed(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("friction", "verdict"), [(1.5, "coulomb_friction"), (0.0, "none")])
+def test_a_rig_without_states_or_tolerances_is_diagnosed(friction: float, verdict: str, tmp_path: Path) -> None:
     """Nothing of the nominal model is unknown then."""
     t = np.arange(0.0, 20.0, 0.01)
     x = 0.02 * np.sin(2.0 * t) + 0.01 * np.sin(5.1 * t)
-    rub = -1.5 * np.tanh(np.gradient(x, t) / 1e-3)
+    rub = -friction * np.tanh(np.gradient(x, t) / 1e-3)
     force = 200.0 * x + rub + np.random.default_rng(1).normal(0.0, 0.01, len(t))
     log = tmp_path / "log.csv"
     np.savetxt(log, np.column_stack([t, 1e3 * x, force]), "%.6f", ",", header="t,x,f", comments="")
     found = prepared(written(tmp_path, STATIC, STATIC_YAML), [log]).diagnose()
-    assert found.verdict == "coulomb_friction" and found.gap.best < 0.2 * found.gap.refit
+    assert found.verdict == verdict
+    assert found.gap.best < 0.2 * found.gap.refit or verdict == "none"
+
+
+@pytest.mark.slow
+def test_a_sensor_whose_zero_creeps_is_named_with_its_place(tmp_path: Path) -> None:
+    """Neither a constant force nor a constant error: the offset's shape in time, at the sensor."""
+    fitted, held = (cart_log(tmp_path / f"{name}.csv", 0.0, seconds, seed, creep=0.03)
+                    for name, seconds, seed in (("fit", 16.0, 1), ("held", 12.0, 7)))  # fmt: skip
+    found = prepared(written(tmp_path), [fitted], held).diagnose()
+    (entry,) = found.budget
+    assert (found.verdict, entry.law, entry.places) == ("offset", "differs", ("sensor:position",))
+    assert found.gap.best < 0.05 * found.gap.refit
