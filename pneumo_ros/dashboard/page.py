@@ -25,6 +25,7 @@ from bokeh.models import (
 )
 from bokeh.plotting import figure
 
+from pneumo_ros.dashboard.pace import Pace
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
 from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, wrapping
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
@@ -37,8 +38,8 @@ PANEL_HEIGHT = 190  # px
 WIDGET = 290  # px; the longest name of a parameter with its unit fits above its field
 EVENTS_SHOWN = 200
 ANSWERS_SHOWN = 6
-IN_FLIGHT = 2  # pictures a slow browser may lag behind before the next is held back: its buttons must keep working
-PATIENCE = 1.0  # s
+# Said when the picture is on the screen: what a browser has drawn is a frame and a turn of its loop later.
+DRAWN = "const n = cb_obj.text; requestAnimationFrame(() => setTimeout(() => { echo.text = n; }, 0));"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "5", "10")
 _COLOURS = {"playing": "#2a7", "live": "#2a7", "paused": "#777", "waiting": "#c80", "ended": "#36c"}
 _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
@@ -59,16 +60,17 @@ class Page:
         self._answers = Div(text="", name="answers")
         self._gains = column(name="gains", sizing_mode="stretch_width")
         self._known: tuple[Control, ...] = ()
-        self._sent, self._sent_at = 0, 0.0
+        self._pace = Pace()
         self._beat, self._echo = (Div(text="0", visible=False, name=name) for name in ("beat", "echo"))
-        self._beat.js_on_change("text", CustomJS(args={"echo": self._echo}, code="echo.text = cb_obj.text"))
+        self._beat.js_on_change("text", CustomJS(args={"echo": self._echo}, code=DRAWN))
+        self._echo.on_change("text", self._drawn)
         self._position: Slider | None = None
         self._play: Toggle | None = None
         self._buttons: tuple[Button, ...] = ()
         furnish(document, source.title)
         document.add_root(self._layout())
         document.add_periodic_callback(self.refresh, REFRESH_MS)
-        self.refresh()
+        self._show(0)
 
     def _layout(self) -> Any:
         plots = side_by_side([self._plot(panel) for panel in PANELS])
@@ -183,21 +185,25 @@ class Page:
 
     # -- refresh ---------------------------------------------------------------------------------------------------
 
+    def _drawn(self, attr: str, old: str, new: str) -> None:
+        self._pace.drawn(int(new) if new.isdecimal() else 0, time.monotonic())
+
     def refresh(self) -> None:
-        """Bring every plot and text up to date."""
+        """Bring every plot and text up to date, when the browser is ready for it."""
         now = time.monotonic()
-        if int(self._echo.text) > 0:  # playback waits until the browser has drawn its first picture
+        if self._pace.begun:  # playback waits until the browser has drawn its first picture
             self._source.tick(now - self._last)
         self._last = now
-        # Now and then one goes out all the same: what was sent before the browser listened is never echoed.
-        if self._sent - int(self._echo.text) >= IN_FLIGHT and now - self._sent_at < PATIENCE:
-            return
-        self._sent, self._sent_at = self._sent + 1, now
+        if self._pace.due(now):
+            self._show(self._pace.send(now))
+
+    def _show(self, number: int) -> None:
+        """One picture; 0 is what the page comes with."""
         status = self._source.status()
         shown = (status.now_ns - status.start_ns) * 1e-9
         self._document.hold("combine")
         try:
-            self._beat.text = str(self._sent)
+            self._beat.text = str(number)
             self._status.text = _status_text(self._source.title, status)
             self._refresh_plots(status.start_ns)
             end = max(shown, WINDOW)

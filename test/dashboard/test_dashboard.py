@@ -33,6 +33,7 @@ from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from pneumo_ros.dashboard.guard import MAX_VIEWERS, is_loopback
+from pneumo_ros.dashboard.pace import Pace
 from pneumo_ros.dashboard.page import Page
 from pneumo_ros.dashboard.panels import MOTION, PANELS, TYRES, Samples, derive, thin
 from pneumo_ros.dashboard.ring import Ring
@@ -77,14 +78,13 @@ def served(*arguments: str, module: str = "pneumo_ros.cli.view") -> Iterator[tup
             said.append(line)
             if found := URL.search(line):
                 yield found.group(), process
-                return
-        raise AssertionError("".join(said))
-    finally:
+                break
+        else:
+            raise AssertionError("".join(said))
         process.send_signal(signal.SIGINT)
-        try:
-            process.wait(60)  # a session writes its log and its report before it ends
-        finally:
-            process.kill()
+        process.wait(20)
+    finally:
+        process.kill()
 
 
 @pytest.fixture(scope="module")
@@ -336,6 +336,29 @@ def assert_valves_closed(log: object, after_ns: int) -> None:
     for height, pressure in zip(heights, x[:, 8:10].T, strict=True):
         air = pressure * (VOLUME_OFFSET + MEAN_AREA * height) ** rig.polytropic_exponent.value
         assert np.ptp(air) < 1e-3 * air.mean()
+
+
+def shown_by(takes: float, seconds: float = 60.0) -> tuple[int, int]:
+    """Pictures that a browser draws which needs so many s for each, and the most that ever waited in it."""
+    pace, waiting, most, drawn, ready = Pace(), [], 0, 0, np.inf
+    for now in np.arange(0.0, seconds, 0.01).tolist():
+        if waiting and now >= ready:
+            drawn += 1
+            pace.drawn(waiting.pop(0), now)
+            ready = now + takes if waiting else np.inf
+        if round(now * 100) % 10 == 0 and pace.due(now):
+            waiting.append(pace.send(now))
+            ready = min(ready, now + takes)
+            most = max(most, len(waiting))
+    return drawn, most
+
+
+def test_a_slow_browser_never_falls_behind() -> None:
+    """Ten pictures a second where it can; half of its time, and no queue, where it cannot; few where nobody listens."""
+    assert shown_by(0.02)[0] >= 590 and shown_by(0.02)[1] == 1
+    assert shown_by(0.4) == (pytest.approx(74, abs=4), 1)
+    assert shown_by(3.0)[0] >= 8 and shown_by(3.0)[1] <= 3
+    assert shown_by(1000.0) == (0, 6)
 
 
 def test_ring_keeps_the_newest_and_begins_again_when_time_goes_back() -> None:
