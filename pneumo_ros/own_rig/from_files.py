@@ -6,17 +6,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.own_rig.description import Description, read_description
-from pneumo_ros.own_rig.model import OwnRig, own_rig
+from pneumo_ros.own_rig.model import OwnRig, own_rig, windows_of
 from pneumo_ros.own_rig.physics import Physics, load_physics
 from pneumo_ros.own_rig.records import FEWEST, OwnRecord, read_record
 from pneumo_ros.own_rig.whereabouts import whereabouts
 from pneumo_ros.slots.laws import LAWS
+
+APART = 30.0  # between what the model and the log move, from which on a unit is suspected
+AT_REST = 3.0  # sigmas of noise that a log must move by to be compared with
 
 
 @dataclass(frozen=True)
@@ -81,7 +88,39 @@ def prepared(
         names = ", ".join(f"{one.effect} ({one.site})" for one in description.effects)
         notes.append(f"the rig file names {names}: part of the model as stated there; what competes is what the logs "
                      "show beyond it")  # fmt: skip
-    return OwnTask(own_rig(description, physics, logs, without), tuple(logs), held, tuple(notes))
+    made = own_rig(description, physics, logs, without)
+    return OwnTask(made, tuple(logs), held, (*notes, *_of_another_order(made, logs)))
+
+
+def _of_another_order(model: OwnRig, records: Sequence[OwnRecord]) -> list[str]:
+    """A note on each channel that the nominal model moves far more or less than the log: mostly a unit is wrong.
+
+    More in short windows from the log's own state, because a free run may drift however right its units are; less in
+    the free run, because a wrong state moves a window as far as it is wrong.
+    """
+    windows = [w for record in records for w in windows_of(model.description, model.physics, record)]
+    more = _moves(model, [(w.record, w.state) for w in windows])
+    less = _moves(model, [(record, model.initial(record)[0]) for record in records])
+    notes = []
+    for name, far, near in zip(model.channels, more, less, strict=True):
+        ratio = near if near < 1.0 / APART else far
+        if ratio < 1.0 / APART or ratio > APART:
+            notes.append(f"{name}: the nominal model moves {ratio:.2g} times as far as the log; if that is a unit: "
+                         "rig.py gets SI, whatever units rig.yaml names")  # fmt: skip
+    return notes
+
+
+def _moves(model: OwnRig, pieces: Sequence[tuple[Any, Array]]) -> Array:
+    """(C,) how far the nominal model moves from where it starts, rms, in units of what the log does; 1 for a channel
+    that is at rest.
+    """
+    nominal = np.array([p.nominal for p in model.parameters])
+    runs = [model.predict(record, nominal, state, ()) for record, state in pieces]
+    own = np.vstack([run - run[0] for run in runs])
+    seen = np.vstack([record.measured - record.measured[0] for record, _ in pieces])
+    far, moved = (np.sqrt(np.mean(one**2, axis=0)) for one in (own, seen))
+    noise = np.max([record.noise for record, _ in pieces], axis=0)
+    return np.where(moved > AT_REST * noise, far / np.maximum(moved, 1e-300), 1.0)
 
 
 def _loaded(model: Path, description: Description) -> tuple[Physics, Description]:

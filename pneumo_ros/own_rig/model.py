@@ -220,7 +220,7 @@ def own_rig(rig: Description, physics: Physics, records: Sequence[OwnRecord], wi
     """
     nominal = np.array([q.value for q in rig.parameters.values()])
     held = np.array([spec.hold for spec in rig.inputs.values()], dtype=bool)
-    windows = [w for record in records for w in _windows(rig, physics, record)]
+    windows = [w for record in records for w in windows_of(rig, physics, record)]
     scaling = Scaler(physics, windows, nominal, held).scaling()
     if rig.scales:
         scaling = _saved(scaling, rig, physics)
@@ -234,7 +234,8 @@ def own_rig(rig: Description, physics: Physics, records: Sequence[OwnRecord], wi
     return model
 
 
-def _windows(rig: Description, physics: Physics, record: OwnRecord) -> list[Window]:
+def windows_of(rig: Description, physics: Physics, record: OwnRecord) -> list[Window]:
+    """Pieces of a record about a block long, each with the state that the rig file reads from its first rows."""
     rows = len(record.measured)
     length = int(np.clip(round(record.pace.block / record.period), min(40, rows), rows))
     starts = np.unique(np.linspace(0, rows - length, min(WINDOWS, max(1, rows // length))).astype(int))

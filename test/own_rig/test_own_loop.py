@@ -137,3 +137,13 @@ def test_a_sensor_whose_zero_creeps_is_named_with_its_place(tmp_path: Path) -> N
     (entry,) = found.budget
     assert (found.verdict, entry.law, entry.places) == ("offset", "differs", ("sensor:position",))
     assert found.gap.best < 0.05 * found.gap.refit
+
+
+@pytest.mark.parametrize(("unit", "told"), [("mm", False), ("m", True), ("um", True)])
+def test_a_model_of_another_order_than_its_log_is_told_to_look_at_its_units(
+    unit: str, told: bool, tmp_path: Path
+) -> None:
+    log = cart_log(tmp_path / "log.csv", 0.5)
+    task = prepared(written(tmp_path, names=CART_YAML.replace("unit: mm", f"unit: {unit}")), [log])
+    notes = [note for note in task.notes if "times as far as the log" in note]
+    assert bool(notes) == told and all(note.startswith("position: the nominal model moves") for note in notes)
