@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Final, TypeVar
 
 import numpy as np
@@ -175,6 +176,12 @@ class Problem:
     def fitted(self) -> Mask:
         """(n,) samples that the fit sees; the others are for selection."""
         return self.block % SELECT_EVERY != self.fold
+
+    @cached_property
+    def rows_of(self) -> tuple[slice, ...]:
+        """The fit samples of each log."""
+        ends = np.cumsum([0, *(len(r.measured) // self.averaged for r in self.records)]).tolist()
+        return tuple(slice(first, last) for first, last in pairwise(ends))
 
     @cached_property
     def parameters_of(self) -> dict[Part, tuple[EffectParameter, ...]]:

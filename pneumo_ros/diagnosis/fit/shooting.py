@@ -18,6 +18,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Record
 
 WINDOWS: Final = 2  # windows in a time block [taste]
+ALL: Final = -1  # as a fold: no block is kept from the fit [definition]
 FAILED_GAP: Final = 1.0  # normalised gap of a free run that is worse than the log's own mean [definition]
 
 
@@ -34,20 +35,27 @@ def free_run_failed(problem: Problem, state: Fit) -> bool:
     return state.diverged or problem.gap(state.residual.clip(-1e6, 1e6)) > FAILED_GAP
 
 
+def windowed(problem: Problem) -> Problem | None:
+    """The same model on short windows of the fitted blocks, all of them fitted; None if the logs cannot be cut."""
+    pieces = [piece for record in problem.records for piece in _windows(record, problem.fold, problem.pace.block)]
+    return Problem(problem.model, tuple(pieces), problem.averaged, ALL) if pieces else None
+
+
 def fit_from_windows(problem: Problem, candidate: Candidate, start: Array, iterations: int) -> Fit | None:
     """A free-run fit that starts from what windows of the fitted blocks say; None if they cannot be cut or diverge."""
-    pieces = [piece for record in problem.records for piece in _windows(record, problem.fold, problem.pace.block)]
-    if not pieces:
+    short = windowed(problem)
+    if short is None:
         return None
-    short = Problem(problem.model, tuple(pieces), problem.averaged)
-    shared = len(problem.model.parameters)
-    own = np.concatenate([start[:shared], np.zeros(short.fixed - shared), start[problem.fixed :]])
-    found = fit(short, candidate, own, rows=np.ones(len(short.measured), dtype=bool), iterations=iterations)
+    found = fit(short, candidate, carried(problem, short, start), iterations=iterations)
     if found.diverged:
         return None
-    free = np.zeros(problem.fixed - shared)
-    begin = np.concatenate([found.x[:shared], free, found.x[short.fixed :]])
-    return fit(problem, candidate, begin, iterations=iterations)
+    return fit(problem, candidate, carried(short, problem, found.x), iterations=iterations)
+
+
+def carried(one: Problem, other: Problem, x: Array) -> Array:
+    """Scaled unknowns for other pieces of the same logs: the initial states there are as they were measured."""
+    shared = len(one.model.parameters)
+    return np.concatenate([x[:shared], np.zeros(other.fixed - shared), x[one.fixed :]])
 
 
 def _windows(record: Record, fold: int, block: float) -> list[Any]:

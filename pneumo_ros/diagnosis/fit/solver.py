@@ -21,6 +21,7 @@ an LVDT's scale error four rounds end at the same cost (-540.3) with 650 simulat
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -214,16 +215,33 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None, stale: Array
         wanted = wanted[~still]
     here = problem.predict_coarse(state.candidate, state.x)
 
-    def column(m: int) -> Array:
-        step = STEP if state.x[m] + STEP <= high[m] else -STEP
+    def changes(together: list[int]) -> Array:
+        step = STEP if state.x[together[0]] + STEP <= high[together[0]] else -STEP
         moved = state.x.copy()
-        moved[m] += step
+        moved[together] += step
         change = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
         return np.where(np.isfinite(change), change, 0.0)
 
-    for m, change in zip(wanted, problem.each(column, wanted.tolist()), strict=True):
-        columns[:, :, m] = change
-    return columns, len(wanted)
+    groups = _together(problem, wanted.tolist())
+    for group, change in zip(groups, problem.each(changes, groups), strict=True):
+        if len(group) == 1:
+            columns[:, :, group[0]] = change
+            continue
+        for m in group:
+            rows = problem.rows_of[(m - len(problem.model.parameters)) // problem.states]
+            columns[:, :, m] = 0.0
+            columns[rows, :, m] = change[rows]
+    return columns, len(groups)
+
+
+def _together(problem: Problem, unknowns: Sequence[int]) -> list[list[int]]:
+    """Unknowns that one simulation serves: a state at the start of each log moves that log alone."""
+    first = len(problem.model.parameters)
+    groups: dict[int, list[int]] = {}
+    for m in unknowns:
+        state = first + (m - first) % problem.states if first <= m < problem.fixed else m
+        groups.setdefault(state, []).append(m)
+    return list(groups.values())
 
 
 def refreshed(problem: Problem, state: Fit) -> Fit:

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from typing import Final
 
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.shooting import carried, free_run_failed, windowed
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.fitting import (
     by_cost,
@@ -159,6 +161,8 @@ def _run_singles(search: Search) -> None:
     search.screened = candidate_scores(problem, search.refit, found)
     search.visible = visibility(problem, search.refit, found)
     likely = probed(problem, search.refit, search.screened[:PROBED])
+    if free_run_failed(problem, search.refit):
+        likely = _merged(_near_the_log(search), likely)
     chosen = varied(likely, effort.singles, 3)
     short = short_fits(search, search.refit, chosen, (0.1, 0.4))
     ended = [
@@ -166,6 +170,26 @@ def _run_singles(search: Search) -> None:
         for k, one in enumerate(short[: effort.finalists])
     ]
     search.singles = by_cost(ended) + short[effort.finalists :]
+
+
+def _near_the_log(search: Search) -> list[CandidateScore]:
+    """The singles as short windows see them, the most promising first: next to a free run that is lost, no candidate is
+    better than another.
+    """
+    problem, short = search.problem, windowed(search.problem)
+    if short is None:
+        return []
+    base = fit(short, Candidate(), carried(problem, short, search.refit.x), iterations=search.effort.short)
+    if base.diverged:
+        return []
+    base = refreshed(short, base)
+    screened = candidate_scores(short, base, trials(short, base, all_parts(short)))
+    return probed(short, base, screened[:PROBED])
+
+
+def _merged(one: Sequence[CandidateScore], other: Sequence[CandidateScore]) -> list[CandidateScore]:
+    """Two rankings in turn; the same candidate from other values is another start."""
+    return [entry for both in zip_longest(one, other) for entry in both if entry is not None]
 
 
 def _run_pairs(search: Search) -> None:
