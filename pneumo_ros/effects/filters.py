@@ -10,7 +10,8 @@ a, b : the filter's two states
 u, following, last : input: the block (N,) or one sample, the next one, the one before the block
 fresh : nothing was filtered yet: the filter rests at the first sample
 A, B0, B1, C, D : of :class:`_Form`
-half, held : half the width of a play, and where its follower was; in the input's unit
+half, held, most : half the width of a play, where its follower was, how far one goes in a sample; in the input's
+    unit
 """
 
 from __future__ import annotations
@@ -140,5 +141,15 @@ def played(u: Array, half: float, held: float) -> Array:
     y = np.empty_like(u)
     for i in range(u.shape[0]):
         held = min(max(held, u[i] - half), u[i] + half)
+        y[i] = held
+    return y
+
+
+@njit(cache=True)
+def slewed(u: Array, most: float) -> Array:
+    """What follows its input (N,) by at most so much a sample, from where that begins."""
+    y, held = np.empty_like(u), u[0]
+    for i in range(u.shape[0]):
+        held += min(max(u[i] - held, -most), most)
         y[i] = held
     return y

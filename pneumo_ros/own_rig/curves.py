@@ -125,7 +125,7 @@ def _signal(model: Running, parts: Sequence[Active], record: OwnRecord, step: bo
     P = model.signal_values(place, parts)
     if step:
         length = 4.0 * max(
-            float(S[si.S_LAGS + 2]), *(P[[si.LAG, si.SECOND_LAG, si.DELAY]] if P is not None else (0.0,))
+            float(S[si.S_LAGS + 2]), *(P[[si.LAG, si.SECOND_LAG, si.DELAY, si.SLOWNESS]] if P is not None else (0.0,))
         )
         period = length / STEP_ROWS
         u = np.ones(STEP_ROWS + 4)

@@ -95,6 +95,11 @@ class Description:
     fmu: FmuNames | None = None
     raw: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
+    @property
+    def form_assumed(self) -> bool:
+        """Whether nobody has said what the model form is worth."""
+        return "model_form" not in self.raw
+
 
 def read_description(path: Path) -> Description:
     """Read a rig file.

@@ -27,6 +27,10 @@ UNITS: dict[str, tuple[float, float, str]] = {
     "mbar": (1e2, 0.0, "Pa"), "psi": (PSI, 0.0, "Pa"), "bar gauge": (1e5, ATMOSPHERE, "Pa"),
     "kPa gauge": (1e3, ATMOSPHERE, "Pa"), "psi gauge": (PSI, ATMOSPHERE, "Pa"),
     "K": (1.0, 0.0, "K"), "degC": (1.0, 273.15, "K"), "kg/s": (1.0, 0.0, "kg/s"), "g/s": (1e-3, 0.0, "kg/s"),
+    "rad/s2": (1.0, 0.0, "rad/s2"), "deg/s2": (DEGREE, 0.0, "rad/s2"), "mN": (1e-3, 0.0, "N"),
+    "mN m": (1e-3, 0.0, "N m"), "kN m": (1e3, 0.0, "N m"), "W": (1.0, 0.0, "W"), "kW": (1e3, 0.0, "W"),
+    "m3": (1.0, 0.0, "m3"), "l": (1e-3, 0.0, "m3"), "ml": (1e-6, 0.0, "m3"), "m3/s": (1.0, 0.0, "m3/s"),
+    "m3/h": (1.0 / 3600.0, 0.0, "m3/s"), "l/s": (1e-3, 0.0, "m3/s"), "l/min": (1e-3 / 60.0, 0.0, "m3/s"),
 }  # fmt: skip
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _TEXT = re.compile(rf"^\s*({_NUMBER})\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER})\s*(%)?)?\s*(.*?)\s*$")

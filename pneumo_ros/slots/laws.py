@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
@@ -206,6 +208,9 @@ SIGNAL_LAWS = (
         (Knob("lag", "s", si.LAG, lambda m: 0.02 * m.period, 0.0, 200.0),)),
     Law("lag.second", SIGNALS, "a slow response (second order)",
         (Knob("lag", "s", si.SECOND_LAG, lambda m: 0.01 * m.period, 0.0, 200.0),)),
+    Law("lag.limited", INPUT, "a response that cannot be faster than so much",
+        (Knob("slowness", "s/{unit}", si.SLOWNESS, lambda m: m.period / (4.0 * np.pi * m.travel), 0.0, 60.0,
+              starts=(0.3, 3.0)),)),
     Law("delay", SIGNALS, "a response that comes late",
         (Knob("delay", "s", si.DELAY, lambda m: 0.02 * m.period, 0.0, 50.0),)),
     Law("dead_zone", INPUT, "nothing happens about zero",

@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.filters import first_order_line, played
+from pneumo_ros.effects.filters import first_order_line, played, slewed
 
 # Laws: columns of P.
 GAIN, OFFSET, SQUARE, CUBE = 0, 1, 2, 3
 LAG, SECOND_LAG, DELAY = 4, 5, 6
 DEAD, CUT, SOFT_CUT, PLAY = 7, 8, 9, 10
-LAWS = 11
+SLOWNESS = 11  # s for each unit: the rate it cannot exceed, turned over
+LAWS = 12
 
 # Atoms.
 POWERS = LAWS  # constant, linear, square, cube
@@ -76,6 +77,8 @@ def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
     out = _static(u, P, S)
     if P[PLAY] != 0.0:
         out = played(out, P[PLAY], out[0])
+    if P[SLOWNESS] != 0.0:
+        out = slewed(out, period / P[SLOWNESS])
     if P[LAG] != 0.0:
         out = lagged(out, period, P[LAG])
     if P[SECOND_LAG] != 0.0:
@@ -107,7 +110,7 @@ def _crept(rows: int, period: float, P: Array, S: Array) -> Array:
 def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:
     """What a sensor with these values alone was shown to read ``y``, by fixed point; ways that take time are left."""
     still = P.copy()
-    still[[LAG, SECOND_LAG, DELAY, PLAY, CUT]] = 0.0
+    still[[LAG, SECOND_LAG, DELAY, PLAY, CUT, SLOWNESS]] = 0.0
     still[PLAYS:VALUES] = 0.0
     true = y.copy()
     with np.errstate(over="ignore", invalid="ignore"):

@@ -114,18 +114,36 @@ parameters: {stiffness: 200 N/m}
 """
 
 
-@pytest.mark.parametrize(("friction", "verdict"), [(1.5, "coulomb_friction"), (0.0, "none")])
-def test_a_rig_without_states_or_tolerances_is_diagnosed(friction: float, verdict: str, tmp_path: Path) -> None:
-    """Nothing of the nominal model is unknown then."""
+def static_log(path: Path, friction: float) -> Path:
+    """A force over a travel with dry friction, N, 0.01 N of noise."""
     t = np.arange(0.0, 20.0, 0.01)
     x = 0.02 * np.sin(2.0 * t) + 0.01 * np.sin(5.1 * t)
     rub = -friction * np.tanh(np.gradient(x, t) / 1e-3)
     force = 200.0 * x + rub + np.random.default_rng(1).normal(0.0, 0.01, len(t))
-    log = tmp_path / "log.csv"
-    np.savetxt(log, np.column_stack([t, 1e3 * x, force]), "%.6f", ",", header="t,x,f", comments="")
+    np.savetxt(path, np.column_stack([t, 1e3 * x, force]), "%.6f", ",", header="t,x,f", comments="")
+    return path
+
+
+@pytest.mark.parametrize(("friction", "verdict"), [(1.5, "coulomb_friction"), (0.0, "none")])
+def test_a_rig_without_states_or_tolerances_is_diagnosed(friction: float, verdict: str, tmp_path: Path) -> None:
+    """Nothing of the nominal model is unknown then."""
+    log = static_log(tmp_path / "log.csv", friction)
     found = prepared(written(tmp_path, STATIC, STATIC_YAML), [log]).diagnose()
     assert found.verdict == verdict
     assert found.gap.best < 0.2 * found.gap.refit or verdict == "none"
+
+
+@pytest.mark.parametrize(("stated", "verdict"), [("", "coulomb_friction"), ("model_form: 5 %", "none")])
+def test_a_form_that_nobody_stated_hides_no_effect_that_closes_nearly_all(
+    stated: str, verdict: str, tmp_path: Path
+) -> None:
+    """A gap of 4 %: less than is assumed of a model's form, but one name leaves a twentieth of it."""
+    log = static_log(tmp_path / "log.csv", 0.1)
+    found = prepared(written(tmp_path, STATIC, f"{STATIC_YAML}{stated}"), [log]).diagnose()
+    assert found.verdict == verdict and 0.02 < found.gap.refit < 0.05
+    assert any("model_form is not stated: 5 % was assumed" in note for note in found.notes) == (not stated)
+    shares = sum(entry.share for entry in found.budget) + found.refit_share + found.floor_share
+    assert shares == pytest.approx(1.0, abs=0.05), "no share is told twice"
 
 
 @pytest.mark.slow

@@ -151,3 +151,14 @@ def test_every_family_says_how_to_check_it_by_hand(law: Law) -> None:
 def _size_of(effect: SlotEffect) -> list[str]:
     told = effect.guide is not None and effect.guide.names()
     return [displayed(effect.parameters[0].typical, effect.parameters[0].unit)] if told else []
+
+
+def test_an_actuator_that_cannot_be_faster_follows_at_its_rate() -> None:
+    """A step of 3 V at 2 V/s arrives after 1.5 s; what is slower passes as it is."""
+    P, S = np.zeros(si.VALUES), si.scales_of(np.array([0.0, 3.0]), 1.0)
+    P[si.SLOWNESS] = 0.5  # s/V
+    time = np.arange(0.0, 3.0, 0.01)
+    step = np.where(time > 0.0, 3.0, 0.0)
+    np.testing.assert_allclose(si.passed(step, 0.01, P, S), np.minimum(2.0 * time, 3.0), atol=1e-9)
+    slow = 0.3 * np.sin(2.0 * time)
+    np.testing.assert_array_equal(si.passed(slow, 0.01, P, S), slow)

@@ -46,8 +46,8 @@ class Budget:
     ----------
     effects : law -> its share
     refit : what the parameters close alone, inside their tolerances
-    remainder : what neither closes, above the floor; below zero where the structure predicts better than it
-    floor : what sensors and the model's stated form leave
+    remainder : what neither closes, above the floor
+    floor : what sensors and the model's stated form leave, no more than is left
     """
 
     effects: dict[Part, Share]
@@ -78,9 +78,10 @@ def budget(problem: Problem, best: Fit, holdout: Any, floor: float, nominal: flo
         law: Share(float(np.mean(share)) * scale, (float(low), float(high)))
         for law, share, (low, high) in zip(laws, shares, draws, strict=True)
     }
-    base = min(floor**2 / whole, 1.0)
     tolerances = 1.0 - refit**2 / whole
-    return Budget(effects, tolerances, 1.0 - tolerances - base - sum(s.value for s in effects.values()), base)
+    left = 1.0 - tolerances - sum(s.value for s in effects.values())
+    base = min(floor**2 / whole, max(left, 0.0))  # sensors and form make no more of the gap than is there
+    return Budget(effects, tolerances, left - base, base)
 
 
 def _belongs(part: Part, law: Part, laws: Sequence[Part]) -> bool:
