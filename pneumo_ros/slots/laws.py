@@ -13,6 +13,7 @@ from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
 
 MOST = 300.0  # of a typical size: a bound for the solver, no physical limit
+HARDEST = 5000.0  # the same of a stop's stiffness: steel on steel is that much stiffer than a spring
 
 
 @dataclass(frozen=True)
@@ -143,13 +144,13 @@ FORCE_LAWS = (
         (Knob("hysteresis_force", N, fo.SLIDERS, _size),
          _shape("yield_travel", M, fo.SLIDERS_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0)))),
     Law("stop", FORCES, "a stop at the upper end of the travel",
-        (Knob("stop_stiffness", NM, fo.STOP_ABOVE, lambda m: 5.0 * m.size / m.travel),
+        (Knob("stop_stiffness", NM, fo.STOP_ABOVE, lambda m: 5.0 * m.size / m.travel, 0.0, HARDEST),
          _shape("stop_depth", M, fo.STOP_ABOVE_DEPTH, lambda m: 0.2 * m.travel, 0.0, 9.0, (0.2, 2.5)),
-         _shape("stop_loss", "1", fo.STOP_ABOVE_LOSS, lambda m: 0.3, 0.0, 5.0, ()))),
+         _shape("stop_loss", "1", fo.STOP_ABOVE_LOSS, lambda m: 0.3, 0.0, 60.0, (10.0,)))),
     Law("stop.below", FORCES, "a stop at the lower end of the travel",
-        (Knob("stop_stiffness", NM, fo.STOP_BELOW, lambda m: 5.0 * m.size / m.travel),
+        (Knob("stop_stiffness", NM, fo.STOP_BELOW, lambda m: 5.0 * m.size / m.travel, 0.0, HARDEST),
          _shape("stop_depth", M, fo.STOP_BELOW_DEPTH, lambda m: 0.2 * m.travel, 0.0, 9.0, (0.2, 2.5)),
-         _shape("stop_loss", "1", fo.STOP_BELOW_LOSS, lambda m: 0.3, 0.0, 5.0, ()))),
+         _shape("stop_loss", "1", fo.STOP_BELOW_LOSS, lambda m: 0.3, 0.0, 60.0, (10.0,)))),
     Law("spring_error", FORCES, "stiffness that is off", (Knob("stiffness", NM, fo.SPRING, _per_travel, -MOST),)),
     Law("spring_error.cubic", FORCES, "a spring that hardens or softens",
         (Knob("cubic_stiffness", "{unit}/{travel}3", fo.SPRING_CUBIC, lambda m: m.size / m.travel**3, -MOST),)),
