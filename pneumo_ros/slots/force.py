@@ -3,7 +3,8 @@
 
 ``c`` are the coordinates (travel, rate, load), ``z`` the memories, ``P`` the values of all laws and atoms (0: absent;
 the columns are named here), ``S`` the slot's scales. What opposes a motion is negative at positive rate. Memories move
-once a step by what the travel has moved, as exact as a step is short.
+once a step; within one a force goes on from them by what the travel has moved since, or a stiff hysteresis would be
+half a step late and give energy away.
 
 Kernel arguments
 ----------------
@@ -11,6 +12,7 @@ c, z, P, S : coordinates (3,), memories (MEMORIES,), values of all laws and atom
 x, v, load : the coordinates: travel, its rate, and what presses, in the slot's units
 h : a step, s
 value, limit : any unit
+z, moved, growth : of :func:`bouc_wen`: its memory, what the travel has moved, and how its force goes on
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ MASS, FREQUENCY, DAMPING_RATIO = 32, 33, 34
 CONSTANT = 35
 PULL = 36
 MEMORY, MEMORY_TIME = 37, 38
-LAWS = 39
+BOUC_WEN_GROWTH = 39
+LAWS = 40
 
 # Atoms: first column of each row of them.
 OUT, IN, FEW = LAWS, LAWS + 5, 5  # ramps that saturate at S_RATES, for rates above and below zero
@@ -89,6 +92,26 @@ def start(c: Array, z: Array, S: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def bouc_wen(z: float, moved: float, growth: float) -> float:
+    """Memory after a monotonic move, exact: z' = 1 - z sign(moved) + growth |z| with respect to the move (Wen 1976,
+    J. Eng. Mech. Div. 102, 249-263; growth = -delta / gamma of z' = alpha v - beta (gamma |v| z + delta v |z|)).
+
+    ``moved`` : in yield travels; ``growth`` : above -1; from 1 on the force grows without end
+    """
+    side, left = (1.0, moved) if moved > 0.0 else (-1.0, -moved)
+    if z * side < 0.0:  # on its way back to nothing
+        fall = 1.0 + growth
+        until = math.log(1.0 + fall * abs(z)) / fall
+        if left <= until:
+            return side / fall + (z - side / fall) * math.exp(-fall * left)
+        z, left = 0.0, left - until
+    rise = 1.0 - growth
+    if abs(rise) < 1e-9:
+        return z + side * left
+    return side / rise + (z - side / rise) * math.exp(-rise * left)
+
+
+@njit(cache=True, error_model="numpy")
 def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
     """Memories one step of ``h`` s later; ``c`` at its end."""
     moved = c[0] - z[Z_BEFORE]
@@ -101,9 +124,8 @@ def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
                 z[Z_LAGGED + k] = c[0] + (z[Z_LAGGED + k] - c[0]) * math.exp(-h / S[S_TIMES + k])
     if P[PRESLIDING] != 0.0:
         z[Z_PRE] = clipped(z[Z_PRE] + moved / P[PRESLIDING_TRAVEL], 1.0)
-    if P[BOUC_WEN] != 0.0:  # exact for a monotonic move
-        side = 1.0 if moved > 0.0 else -1.0
-        z[Z_BOUC] = side + (z[Z_BOUC] - side) * math.exp(-abs(moved) / P[BOUC_WEN_TRAVEL])
+    if P[BOUC_WEN] != 0.0:
+        z[Z_BOUC] = bouc_wen(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
     if P[SLIDERS] != 0.0:
         for k in range(3):
             z[Z_THREE + k] = clipped(z[Z_THREE + k] + moved / (THREE[k] * P[SLIDERS_TRAVEL]), 1.0)
@@ -120,12 +142,12 @@ def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
 def force(c: Array, z: Array, P: Array, S: Array) -> float:
     """What acts, in the slot's unit."""
     x, v, load = c[0], c[1], c[2]
-    out = _friction(v, load, z, P, S) + _damping(v, P) + _elastic(x, v, load, z, P, S)
+    out = _friction(x, v, load, z, P, S) + _damping(v, P) + _elastic(x, v, load, z, P, S)
     return out + _atoms(x, v, load, z, P, S) if P[ATOMS_AT_WORK] != 0.0 else out
 
 
 @njit(cache=True, error_model="numpy")
-def _friction(v: float, load: float, z: Array, P: Array, S: Array) -> float:
+def _friction(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> float:
     if not P[: LOADED + 1].any():
         return 0.0
     turned = math.tanh(v / S[S_TURNOVER])
@@ -135,7 +157,8 @@ def _friction(v: float, load: float, z: Array, P: Array, S: Array) -> float:
         out -= P[STRIBECK] * (1.0 + P[STRIBECK_EXTRA] * math.exp(-r * r)) * turned
     if P[SOFT] != 0.0:
         out -= P[SOFT] * math.tanh(v / P[SOFT_RATE])
-    out -= P[PRESLIDING] * z[Z_PRE]
+    if P[PRESLIDING] != 0.0:
+        out -= P[PRESLIDING] * clipped(z[Z_PRE] + (x - z[Z_BEFORE]) / P[PRESLIDING_TRAVEL], 1.0)
     return out - (P[ONE_SIDED_OUT] if v > 0.0 else P[ONE_SIDED_IN]) * turned
 
 
@@ -150,9 +173,12 @@ def _damping(v: float, P: Array) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _elastic(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> float:
-    out = P[CONSTANT] - P[BOUC_WEN] * z[Z_BOUC]
+    out, moved = P[CONSTANT], x - z[Z_BEFORE]
+    if P[BOUC_WEN] != 0.0:
+        out -= P[BOUC_WEN] * bouc_wen(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
     if P[SLIDERS] != 0.0:
-        out -= P[SLIDERS] * (z[Z_THREE] + z[Z_THREE + 1] + z[Z_THREE + 2]) / 3.0
+        for k in range(3):
+            out -= P[SLIDERS] / 3.0 * clipped(z[Z_THREE + k] + moved / (THREE[k] * P[SLIDERS_TRAVEL]), 1.0)
     below, above = S[S_BELOW] + P[STOP_BELOW_DEPTH], S[S_ABOVE] - P[STOP_ABOVE_DEPTH]
     if P[STOP_BELOW] != 0.0 and x < below:
         out += max(0.0, P[STOP_BELOW] * (below - x) * (1.0 - P[STOP_BELOW_LOSS] * v / S[S_RATE]))
@@ -183,7 +209,7 @@ def _atoms(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> flo
         out -= P[LINES + 1] * v - P[LINES + 3] * v * v
     out -= P[LOAD_RAMP] * abs(load) / S[S_LOAD] * clipped(v / S[S_RATES + 1], 1.0)
     for k in range(5):
-        out -= P[SLID + k] * z[Z_SLID + k]
+        out -= P[SLID + k] * clipped(z[Z_SLID + k] + (x - z[Z_BEFORE]) / S[S_SLACKS + k], 1.0)
     for k in range(STEPS):
         out += P[BELOW + k] * max(0.0, S[S_BELOW + k] - x) - P[ABOVE + k] * max(0.0, x - S[S_ABOVE + k])
     if x < S[S_BELOW + 1]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,22 @@ def test_dry_friction_stops_the_cart(cart: tuple[OwnRig, OwnRecord]) -> None:
     peaks = [abs(path[i]) for i in range(1, len(path) - 1) if (path[i] - path[i - 1]) * (path[i + 1] - path[i]) < 0]
     assert peaks[0] == pytest.approx(0.1 - 2 * 0.8 / 80.0, abs=5e-4)
     assert abs(path[-1]) < 0.8 / 80.0
+
+
+@pytest.mark.parametrize(
+    ("law", "values"),
+    [("hysteresis", (6.0, 0.01)), ("hysteresis.growing", (6.0, 0.02, 1.2)), ("hysteresis.sliders", (6.0, 0.01))],
+)
+def test_a_stiff_hysteresis_is_not_half_a_step_late(
+    law: str, values: tuple[float, ...], cart: tuple[OwnRig, OwnRecord]
+) -> None:
+    """Late by half a step its force gives energy away: one step a row runs as eight do."""
+    model, record = cart
+    fine = replace(model, scaling=replace(model.scaling, substeps=8))
+    acting = (Active(law, "rail", values),)
+    start = model.initial(record)[0]
+    coarse, exact = (m.predict(record, np.array([2.0, 80.0, 1.0]), start, acting) for m in (model, fine))
+    assert np.sqrt(np.mean((coarse - exact) ** 2)) < 2e-3 * np.std(exact)
 
 
 def test_what_a_sensor_does_is_taken_out_of_the_start(cart: tuple[OwnRig, OwnRecord]) -> None:

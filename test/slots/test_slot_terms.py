@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from pneumo_ros.effects.guide import displayed
 from pneumo_ros.effects.parameters import family_of
@@ -66,6 +67,16 @@ def test_hysteresis_takes_energy_whatever_the_rate(size: str, travel: str) -> No
 
     assert lost(0.1) > 0.05
     assert lost(0.1) == pytest.approx(lost(10.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("growth", [-0.9, 0.0, 0.5, 1.0, 1.375])
+def test_a_bouc_wen_memory_is_exact_over_a_monotonic_move(growth: float) -> None:
+    rng = np.random.default_rng(3)
+    for start, moved in rng.uniform(-2.0, 2.0, (5, 2)).tolist():
+        side = np.sign(moved)
+        other = solve_ivp(lambda t, z, side=side: side - z + growth * side * np.abs(z), (0.0, abs(moved)), [start],
+                          rtol=1e-10, atol=1e-12).y[0, -1]  # fmt: skip
+        assert fo.bouc_wen(start, moved, growth) == pytest.approx(other, abs=1e-7)
 
 
 def test_friction_is_widened_only_as_far_as_a_step_needs() -> None:
