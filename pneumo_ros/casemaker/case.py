@@ -167,7 +167,8 @@ def _add_budget(
                                  rig_with(everyone - {i}), logs[1], on.car.surface)  # fmt: skip
     total = sum(budget.shares)
     for item in label["truth"]:
-        item["share_of_refit"] = item["share"] / total
+        # Nothing of a held-out log in which no wheel lifts and no stop is met.
+        item["share_of_refit"] = item["share"] / total if total > 0.0 else 0.0
     label["refit_share"] = budget.refit
     label["held_out"] = {"nominal": budget.nominal, "refit": budget.refitted, "complete": budget.complete}
 

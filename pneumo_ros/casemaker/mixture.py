@@ -37,22 +37,24 @@ class Mixture:
 
 
 MIXTURES: dict[str, Mixture] = {
-    "full": Mixture(20264, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
+    "full": Mixture(20265, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
+    "full-0.4": Mixture(20264, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
     "dev6": Mixture(6, none=8, formed=4, single=24, several=14, unknown=8, mixed=6),
     "dev7": Mixture(7, none=8, formed=4, single=24, several=14, unknown=8, mixed=6),
+    "dev8": Mixture(8, none=2, formed=1, single=24, several=8, unknown=6, mixed=0),
 }
 
 
 def mixture(name: str) -> tuple[Planned, ...]:
     """The cases of a set of 0.4 or later, in its public order."""
-    mix = MIXTURES[name]
+    mix, prefix = MIXTURES[name], name.removesuffix("-0.4")  # cases keep the names they had
     rng = np.random.default_rng(mix.seed)
     drafts = [*_bare(mix), *_singles(mix, rng), *_several(mix, rng), *_outside(mix, rng), *_mixed(mix, rng)]
     order = rng.permutation(len(drafts))
     seeds = rng.integers(1, 2**31, len(drafts))
     imperfect = rng.uniform(size=len(drafts)) < IMPERFECT_SHARE
     return tuple(
-        replace(drafts[pick], name=f"{name}-{place:03d}", seed=int(seeds[place]), imperfect=bool(imperfect[place]))
+        replace(drafts[pick], name=f"{prefix}-{place:03d}", seed=int(seeds[place]), imperfect=bool(imperfect[place]))
         for place, pick in enumerate(order)
     )
 
