@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ SLOWER = 1.5  # of the base's interval: a channel that is sampled no faster coun
 MISSING = 0.5  # share of rows without a sample of a channel that is too much
 SHARP = 8.0  # standard errors by which the slope must change where a rig begins to move
 FIRST = (5, 41)  # rows that a first value is fitted to
+WINDOWS = 7  # lengths tried between them
 
 
 @dataclass(frozen=True)
@@ -259,14 +261,47 @@ def _timing(name: str, one: Sampled, start: float) -> TopicTiming:
 
 
 def first_values(record: OwnRecord, column: Array, noise: float) -> tuple[Array, Array]:
-    """Value and rate of a column (N,) at row 0 with their standard deviations: a parabola through the first rows."""
-    rows = int(np.clip(round(record.pace.settle / record.period), *FIRST))
-    rows = min(rows, len(column))
-    t = np.arange(rows) * record.period
+    """Value and rate of a column (N,) at row 0 with their standard deviations: a parabola through the first rows.
+
+    Through how many is what the data say: few rows leave the noise, many bend more than a parabola. The window is the
+    one whose rate has the least of both; the bend is what a cubic says instead.
+    """
+    most = min(int(np.clip(round(record.pace.settle / record.period), *FIRST)), len(column))
+    steps = np.abs(np.diff(column[:most]))
+    noise = max(noise, float(np.min(steps, where=steps > 0.0, initial=np.inf)) / np.sqrt(12.0) if steps.any() else 0.0)
+    sizes = np.unique(np.geomspace(min(FIRST[0], most), most, WINDOWS).round().astype(int))
+    best: tuple[Array, Array] | None = None
+    bends = np.zeros(2)
+    for rows in sizes:
+        with np.errstate(over="ignore", invalid="ignore"):  # what a wild sensor error makes of a log
+            found, white, bend, doubt = _at_first_row(column[:rows], noise, record.period)
+        # The longest may agree by chance: what bent less rows beyond their noise counts.
+        bends = np.maximum(bends, np.maximum(bend - 2.0 * doubt, 0.0))
+        std = np.hypot(white, np.maximum(bends, bend))
+        if best is None or std[1] < best[1][1]:
+            best = found, std
+    assert best is not None
+    return best
+
+
+def _at_first_row(rows: Array, noise: float, period: float) -> tuple[Array, Array, Array, Array]:
+    """Value and rate at the first of some rows, their standard deviations, how far a cubic differs, and the standard
+    deviation of that.
+    """
+    plain, apart, misfit, spare = _polynomials(len(rows))
+    scale = np.array([1.0, 1.0 / max((len(rows) - 1) * period, 1e-12)])
+    noise = max(noise, float(np.sqrt(np.sum((misfit @ rows) ** 2) / spare)))
+    white, doubt = (noise * np.sqrt(np.sum(one**2, axis=1)) * scale for one in (plain, apart))
+    return plain @ rows * scale, white, np.abs(apart @ rows) * scale, doubt
+
+
+@lru_cache(maxsize=64)
+def _polynomials(rows: int) -> tuple[Array, Array, Array, int]:
+    """Of a parabola through so many rows, as matrices: value and rate over the whole length at the first row (2, rows),
+    how far those of a cubic differ, and what it leaves (rows, rows); and how many rows are more than it needs.
+    """
     degree = min(2, rows - 2)
-    A = np.vander(t / max(t[-1], 1e-12), degree + 1, increasing=True)
-    coefficients, *_ = np.linalg.lstsq(A, column[:rows], rcond=None)
-    left = float(np.sqrt(np.sum((column[:rows] - A @ coefficients) ** 2) / max(rows - degree - 1, 1)))
-    std = max(noise, left) * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))
-    scale = np.array([1.0, 1.0 / max(t[-1], 1e-12)])
-    return np.asarray(coefficients[:2] * scale), np.asarray(std[:2] * scale)
+    A = np.vander(np.linspace(0.0, 1.0, rows), degree + 2, increasing=True)
+    plain, cubic = np.linalg.pinv(A[:, :-1]), np.linalg.pinv(A)
+    misfit = np.asarray(np.eye(rows) - A[:, :-1] @ plain)
+    return np.asarray(plain[:2]), np.asarray(cubic[:2] - plain[:2]), misfit, max(rows - degree - 1, 1)
