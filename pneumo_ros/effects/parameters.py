@@ -38,6 +38,7 @@ class EffectParameter:
     spread : prior standard deviation, in typical values; infinite where nothing is known beforehand
     ends : bounds that are natural ends of the law (a part of it that is absent, a share that is whole), where a fit may
         well stop; a stop at another bound is counted against the effect
+    borders : bounds at which another family begins: as telling as a size beyond all measure
     meaning : what it is, in a few words for who has not read the law; '' where nobody wrote it
     """
 
@@ -49,6 +50,7 @@ class EffectParameter:
     size: bool = False
     starts: tuple[float, ...] = ()
     ends: tuple[float, ...] = (0.0,)
+    borders: tuple[float, ...] = ()
     spread: float = math.inf
     meaning: str = ""
 

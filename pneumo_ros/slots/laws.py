@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
@@ -14,6 +15,14 @@ from pneumo_ros.slots import signal as si
 
 MOST = 300.0  # of a typical size: a bound for the solver, no physical limit
 HARDEST = 5000.0  # the same of a stop's stiffness: steel on steel is that much stiffer than a spring
+
+
+class End(Enum):
+    """What lies at a bound of a parameter, and what a fit that stops there says."""
+
+    OWN = "another law of the family"  # nothing
+    OTHER = "another family: a hysteresis that yields at once is dry friction"  # as much as a size that is none
+    LIMIT = "the end of what is tried"  # half of that
 
 
 @dataclass(frozen=True)
@@ -54,7 +63,7 @@ class Knob:
     typical : from the slot's measures
     low, high : bounds, in typical values
     size : zero means that the law is absent
-    open_ended : its bounds are other laws of the family: a fit that stops there says nothing against it
+    ends : what lies at its lower and at its upper bound
     starts : further values to start from, in typical ones
     """
 
@@ -66,7 +75,7 @@ class Knob:
     high: float = MOST
     size: bool = True
     starts: tuple[float, ...] = (8.0,)
-    open_ended: bool = False
+    ends: tuple[End, End] = (End.LIMIT, End.LIMIT)
 
 
 @dataclass(frozen=True)
@@ -102,9 +111,9 @@ def _share(m: Measures) -> float:
 
 def _shape(
     name: str, unit: str, column: int, typical: Callable[[Measures], float], low: float, high: float,
-    starts: tuple[float, ...], open_ended: bool = True,
+    starts: tuple[float, ...], lower: End = End.OWN, upper: End = End.OWN,
 ) -> Knob:  # fmt: skip
-    return Knob(name, unit, column, typical, low, high, size=False, starts=starts, open_ended=open_ended)
+    return Knob(name, unit, column, typical, low, high, size=False, starts=starts, ends=(lower, upper))
 
 
 FORCES, CONTACT = ("force", "contact"), ("contact",)
@@ -120,10 +129,11 @@ FORCE_LAWS = (
          _shape("stribeck_rate", MS, fo.STRIBECK_RATE, lambda m: 0.2 * m.rate, 0.1, 10.0, (0.4, 3.0)))),
     Law("coulomb_friction.soft", FORCES, "dry friction that turns over softly",
         (Knob("friction_force", N, fo.SOFT, _size),
-         _shape("turnover_rate", MS, fo.SOFT_RATE, lambda m: 0.1 * m.rate, 0.1, 4.0, (0.3, 3.0)))),
+         _shape("turnover_rate", MS, fo.SOFT_RATE, lambda m: 0.1 * m.rate, 0.1, 4.0, (0.3, 3.0), upper=End.OTHER))),
     Law("coulomb_friction.presliding", FORCES, "dry friction that gives before it slips",
         (Knob("friction_force", N, fo.PRESLIDING, _size),
-         _shape("presliding_travel", M, fo.PRESLIDING_TRAVEL, lambda m: 0.05 * m.travel, 0.05, 5.0, (0.2, 3.0)))),
+         _shape("presliding_travel", M, fo.PRESLIDING_TRAVEL, lambda m: 0.05 * m.travel, 0.05, 5.0, (0.2, 3.0),
+                upper=End.OTHER))),
     Law("coulomb_friction.one_sided", FORCES, "dry friction, another one each way",
         (Knob("friction_out", N, fo.ONE_SIDED_OUT, _size), Knob("friction_in", N, fo.ONE_SIDED_IN, _size))),
     Law("coulomb_friction.loaded", FORCES, "dry friction in proportion to the load",
@@ -134,19 +144,22 @@ FORCE_LAWS = (
         (Knob("damping_out", NS, fo.DAMPING_OUT, _per_rate), Knob("damping_in", NS, fo.DAMPING_IN, _per_rate))),
     Law("viscous_damping.degressive", FORCES, "damping that grows ever less with the rate",
         (Knob("damping", NS, fo.DEGRESSIVE, _per_rate),
-         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.7, 5.0, (3.0,)))),
+         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.7, 5.0, (3.0,), End.OTHER))),
     Law("viscous_damping.quadratic", FORCES, "damping with the square of the rate",
         (Knob("square_damping", "{unit} s2/{travel}2", fo.SQUARE_DAMPING, lambda m: m.size / m.rate**2),)),
     Law("hysteresis", FORCES, "rate-independent hysteresis (Bouc-Wen)",
         (Knob("hysteresis_force", N, fo.BOUC_WEN, _size),
-         _shape("yield_travel", M, fo.BOUC_WEN_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0)))),
+         _shape("yield_travel", M, fo.BOUC_WEN_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0),
+                End.OTHER, End.OTHER))),
     Law("hysteresis.growing", FORCES, "rate-independent hysteresis whose force levels off or grows on (Bouc-Wen)",
         (Knob("hysteresis_force", N, fo.BOUC_WEN, _size),
-         _shape("yield_travel", M, fo.BOUC_WEN_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0)),
+         _shape("yield_travel", M, fo.BOUC_WEN_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0),
+                End.OTHER, End.OTHER),
          _shape("growth", "1", fo.BOUC_WEN_GROWTH, lambda m: 0.5, -1.8, 4.0, (-1.0, 2.6)))),
     Law("hysteresis.sliders", FORCES, "rate-independent hysteresis (parallel sliders)",
         (Knob("hysteresis_force", N, fo.SLIDERS, _size),
-         _shape("yield_travel", M, fo.SLIDERS_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0)))),
+         _shape("yield_travel", M, fo.SLIDERS_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0),
+                End.OTHER, End.OTHER))),
     Law("stop", FORCES, "a stop at the upper end of the travel",
         (Knob("stop_stiffness", NM, fo.STOP_ABOVE, lambda m: 5.0 * m.size / m.travel, 0.0, HARDEST),
          _shape("stop_depth", M, fo.STOP_ABOVE_DEPTH, lambda m: 0.2 * m.travel, 0.0, 9.0, (0.2, 2.5)),
@@ -162,11 +175,12 @@ FORCE_LAWS = (
         (Knob("square_stiffness", "{unit}/{travel}2", fo.SPRING_SQUARE, lambda m: m.size / m.travel**2, -MOST),)),
     Law("relaxation", FORCES, "a spring whose force fades (rubber, creep)",
         (Knob("fading_stiffness", NM, fo.MEMORY, _per_travel),
-         _shape("fading_time", "s", fo.MEMORY_TIME, lambda m: 0.1 * m.period, 0.05, 20.0, (0.3, 5.0)))),
+         _shape("fading_time", "s", fo.MEMORY_TIME, lambda m: 0.1 * m.period, 0.05, 20.0, (0.3, 5.0),
+                End.OTHER, End.OTHER))),
     Law("resonance", FORCES, "something that rings: a mass on a spring",
         (Knob("ringing_mass", "{unit} s2/{travel}", fo.MASS, lambda m: m.size * m.period / m.rate / 6.0),
          _shape("ringing_frequency", "rad/s", fo.FREQUENCY, lambda m: 12.0 / m.period, 0.2, 8.0, (0.5, 2.0, 4.0),
-                False),
+                End.LIMIT, End.LIMIT),
          _shape("ringing_damping", "1", fo.DAMPING_RATIO, lambda m: 0.05, 0.1, 10.0, ()))),
     Law("offset", FORCES, "a constant force", (Knob("constant_force", N, fo.CONSTANT, _size, -MOST),)),
     Law("backlash", CONTACT, "play before the parts touch",
@@ -196,7 +210,8 @@ FLOW_LAWS = (
          _shape("sag_time", "s", fl.DROOP_TIME, lambda m: 0.1 * m.period, 0.01, 30.0, (0.2, 5.0))), needs_load=True),
     Law("heat", FLOW, "filling has warmed or cooled what settles now",
         (Knob("settling", "{unit} s", fl.HEAT, lambda m: 0.1 * m.size * m.whole, -MOST),
-         _shape("settling_time", "s", fl.HEAT_TIME, lambda m: 0.04 * m.whole, 0.05, 4.0, (0.25, 3.0), False))),
+         _shape("settling_time", "s", fl.HEAT_TIME, lambda m: 0.04 * m.whole, 0.05, 4.0, (0.25, 3.0),
+                End.LIMIT, End.LIMIT))),
 )  # fmt: skip
 
 SIGNAL_LAWS = (

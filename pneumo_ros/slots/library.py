@@ -11,7 +11,7 @@ from pneumo_ros.effects.parameters import ANYTHING, SHAPE, Derived, EffectParame
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
 from pneumo_ros.slots.guides import GUIDES
 from pneumo_ros.slots.kinds import Slot
-from pneumo_ros.slots.laws import LAWS, Knob, Law, Measures
+from pneumo_ros.slots.laws import LAWS, End, Knob, Law, Measures
 from pneumo_ros.slots.shapes import CONES, ROWS, Row
 
 
@@ -103,8 +103,11 @@ def _parameter(knob: Knob, m: Measures) -> EffectParameter:
     starts = tuple(s * typical for s in knob.starts if knob.low <= s <= knob.high)
     unit = knob.unit.format(unit=m.unit, travel=m.travel_unit)
     low, high = knob.low * typical, knob.high * typical
-    ends = (0.0, low, high) if knob.open_ended else (0.0,)
-    return EffectParameter(knob.name, unit, low, high, typical, knob.size, starts, ends)
+    own, other = (
+        tuple(bound for bound, end in zip((low, high), knob.ends, strict=True) if end is kind)
+        for kind in (End.OWN, End.OTHER)
+    )
+    return EffectParameter(knob.name, unit, low, high, typical, knob.size, starts, (0.0, *own), other)
 
 
 def _atoms(name: str, summary: str, slot: Slot, m: Measures, columns: Sequence[int], every_sign: bool) -> SlotEffect:

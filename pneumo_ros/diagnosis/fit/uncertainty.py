@@ -87,7 +87,7 @@ def effect_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Estima
         name = p.name if names.count(p.name) == 1 else f"{owner}.{p.name}"
         while name in out:
             name += "_2"
-        at_bound = not free[m] and not _natural(p, value)
+        at_bound = not free[m] and not _stands_at(p, value, p.ends)
         out[name] = Estimate(
             value, float(np.hypot(np.sqrt(cov[m, m]) * p.typical, LAW * value)), p.unit, at_bound, moved < NOTHING
         )
@@ -129,29 +129,32 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     """How many parameters of its effects, or of some parts, ended at an end of their allowed range: of laws and of
     sizes, and of those that only bend a shape.
 
-    A size counts whole: nothing of the kind is so large. What only shapes a law counts half, however much of it,
-    because another law may bend it; and so does a law's size beside its family's shape, which can do the same and may
-    push it anywhere. What shapes a law beside that does not count: nothing is asked of it that the shape cannot do.
+    A size counts whole: nothing of the kind is so large; and so does what shapes a law where another family begins.
+    What else shapes a law counts half, however much of it, because another law may bend it; and so does a law's size
+    beside its family's shape, which can do the same and may push it anywhere. What shapes a law beside that does not
+    count: nothing is asked of it that the shape cannot do.
     """
     free, values = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x)
     first, firm, bent = 0, 0.0, 0.0
     for part in fit.candidate.parts:
         own = problem.effect_parameters(Candidate((part,)))
-        stuck = [p for k, p in enumerate(own, first) if not free[k] and not _natural(p, values[k])]
+        at = [(p, values[k]) for k, p in enumerate(own, first) if not free[k]]
+        stuck = [(p, value) for p, value in at if not _stands_at(p, value, p.ends)]
         first += len(own)
         if parts is not None and part not in parts:
             continue
-        law, sizes = is_law(part[0]), sum(p.size for p in stuck)
+        law = is_law(part[0])
         beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
+        sizes = sum(p.size or (not beside and _stands_at(p, value, p.borders)) for p, value in stuck)
         firm += sizes * (0.5 if beside else 1.0) + (0.5 if law and not beside and len(stuck) > sizes else 0.0)
         bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
     return firm, bent
 
 
-def _natural(parameter: EffectParameter, value: float) -> bool:
-    """Whether a value at a bound is at a natural end of its law: a part that is absent, a share that is whole."""
+def _stands_at(parameter: EffectParameter, value: float, ends: Sequence[float]) -> bool:
+    """Whether the bound that a value stands at is one of these."""
     bound = min(parameter.low, parameter.high, key=lambda one: abs(value - one))
-    return any(abs(bound - end) <= 1e-9 * abs(parameter.typical) for end in parameter.ends)
+    return any(abs(bound - end) <= 1e-9 * abs(parameter.typical) for end in ends)
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:
