@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,10 @@ import pytest
 from helpers.own_rigs import CART, CART_YAML, cart_log, written
 from scipy.integrate import solve_ivp
 
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.signals.types import TopicTiming
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.own_rig.description import read_description
@@ -18,7 +23,7 @@ from pneumo_ros.own_rig.from_files import prepared
 from pneumo_ros.own_rig.kernel import self_contained
 from pneumo_ros.own_rig.model import OwnRig
 from pneumo_ros.own_rig.physics import load_physics
-from pneumo_ros.own_rig.records import OwnRecord, read_record
+from pneumo_ros.own_rig.records import OwnRecord, first_values, read_record
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +55,25 @@ def test_dry_friction_stops_the_cart(cart: tuple[OwnRig, OwnRecord]) -> None:
     peaks = [abs(path[i]) for i in range(1, len(path) - 1) if (path[i] - path[i - 1]) * (path[i + 1] - path[i]) < 0]
     assert peaks[0] == pytest.approx(0.1 - 2 * 0.8 / 80.0, abs=5e-4)
     assert abs(path[-1]) < 0.8 / 80.0
+
+
+@pytest.mark.parametrize(
+    ("law", "at", "counted"),
+    [
+        ("hysteresis", "low", 1.0),  # yields at once: dry friction
+        ("coulomb_friction.presliding", "low", 0.0),  # dry friction without presliding
+        ("coulomb_friction.presliding", "high", 1.0),  # hysteresis
+        ("resonance", "high", 0.5),
+    ],
+)
+def test_a_bound_at_which_another_family_begins_counts_whole(
+    law: str, at: str, counted: float, cart: tuple[OwnRig, OwnRecord]
+) -> None:
+    problem, candidate = Problem(cart[0], (cart[1],)), Candidate(((law, "rail"),))
+    size, shape, *rest = problem.effect_parameters(candidate)
+    values = [size.typical, getattr(shape, at), *(p.typical for p in rest)]
+    stuck = Fit(candidate, problem.start(candidate, None, values), 0.0, np.zeros((1, 1)))
+    assert at_bounds(problem, stuck) == (counted, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -182,3 +206,27 @@ def test_a_model_of_another_order_than_its_log_is_told_to_look_at_its_units(
     task = prepared(written(tmp_path, names=CART_YAML.replace("unit: mm", f"unit: {unit}")), [log])
     notes = [note for note in task.notes if "times as far as the log" in note]
     assert bool(notes) == told and all(note.startswith("position: the nominal model moves") for note in notes)
+
+
+@pytest.mark.parametrize("noise", [1e-6, 5e-4])
+@pytest.mark.parametrize(
+    ("motion", "rate"),
+    [
+        (lambda t: 6.0 * t**2 - 40.0 * t**3, 0.0),  # from rest under a force that falls: bends within a few rows
+        (lambda t: 0.3 * np.sin(2.0 * t), 0.6),
+        (lambda t: np.round(0.5 * t, 3), 0.5),  # read in whole millimetres
+    ],
+)
+def test_the_start_of_a_motion_is_as_sure_as_it_is_told(
+    motion: Callable[[Array], Array], rate: float, noise: float, cart: tuple[OwnRig, OwnRecord]
+) -> None:
+    """A parabola through half a second of a motion that bends within a tenth would be wrong by twenty sigma."""
+    record = replace(cart[1], period=0.01, pace=replace(cart[1].pace, settle=1.0))
+    rng = np.random.default_rng(5)
+    off = []
+    for _ in range(40):
+        column = motion(0.01 * np.arange(64)) + rng.normal(0.0, noise, 64)
+        found, std = first_values(record, column, noise)
+        off.append((found - [motion(np.zeros(1))[0], rate]) / std)
+    assert np.sqrt(np.mean(np.square(off), axis=0)).max() < 1.6
+    assert std[1] < 0.5 + 200.0 * noise

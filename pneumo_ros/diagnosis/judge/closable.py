@@ -45,6 +45,8 @@ class EffectEvidence:
         subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated
     beside : the same beside whatever may act where most of the rest lies, over what it holds without that; 1 where no
         such place is known
+    instead : gap left by whatever may act there in place of the effect, over what the structure leaves, rms; 1 where
+        no such place is known
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -59,6 +61,7 @@ class EffectEvidence:
     bent: float = 0.0
     leaves: float = 1.0
     beside: float = 1.0
+    instead: float = 1.0
 
     @property
     def family(self) -> str:
@@ -148,8 +151,9 @@ def _beside(
     if set(one.places) & set(rest.places) or one.without <= one.own:
         return one
     bare = reduced(problem, rest.fit, of_law(best.candidate, one.law), STEPS, _all(problem))
-    missed = _above(held_by(problem, bare, holdout).total, floor) - rest.gap if not bare.diverged else np.inf
-    return replace(one, beside=float(np.clip(missed / (one.without - one.own), 0.0, 1.0)))
+    left = _above(held_by(problem, bare, holdout).total, floor) if not bare.diverged else np.inf
+    beside = float(np.clip((left - rest.gap) / (one.without - one.own), 0.0, 1.0))
+    return replace(one, beside=beside, instead=float(np.sqrt(left / max(one.own, 1e-12))))
 
 
 def _above(gap: float, floor: float) -> float:

@@ -42,6 +42,8 @@ class Calibration:
     slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
     beside : share of what an effect holds that it must still hold beside whatever may act where the rest of the gap
         lies: a wrong name does the work of what is missing, and nobody misses it once that is there
+    instead : how many times as much (rms) as the structure whatever may act there must leave in the effect's place for
+        that to say nothing: what explains less is no rival
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
@@ -67,6 +69,7 @@ class Calibration:
     least: float = 0.004
     slight: float = 0.12
     beside: float = 0.2
+    instead: float = 2.0
     traces: float = 0.4
     held_real: float = 3.0
     right: float = 0.93
@@ -182,7 +185,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
-               c.slight / max(closed, 1e-9), c.beside / max(one.beside, 1e-9),
+               c.slight / max(closed, 1e-9),
+               min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
     if one.places[0].startswith(
         SENSOR

@@ -87,12 +87,17 @@ def test_how_many_effects_is_judged_by_the_cost() -> None:
     assert found.verdict == "leak+pressure_scale" and found.probability > 0.9
 
 
-@pytest.mark.parametrize(("beside", "named"), [(0.6, True), (0.05, False)])
-def test_a_name_that_nobody_misses_beside_the_rest_is_none(beside: float, named: bool) -> None:
-    """A tyre that seemed to lift did the work of a strap at the strut."""
+@pytest.mark.parametrize(
+    ("beside", "instead", "named"), [(0.6, 1.0, True), (0.05, 0.9, False), (0.05, 1.5, False), (0.05, 3.0, True)]
+)
+def test_a_name_that_nobody_misses_beside_the_rest_is_none(beside: float, instead: float, named: bool) -> None:
+    """A tyre that seemed to lift did the work of a strap at the strut; a dead zone in the drive that leaves three times
+    what friction does is no rival of it.
+    """
     refit, chosen = scored(400.0, 3000.0), scored(90.0, 1500.0, "tyre_liftoff", unknowns=34)
     (one,) = evidence(chosen, 1.0, 0.8, 0.75)
-    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 16.0), [replace(one, beside=beside)])
+    told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 16.0),
+                 [replace(one, beside=beside, instead=instead)])  # fmt: skip
     assert (told.verdict == "tyre_liftoff") is named
 
 
