@@ -78,8 +78,10 @@ def reduced(
 
 
 def rival(problem: Problem, law: Part, other: Part) -> bool:
-    """Whether two effects of unlike families act at one site and are blamed on the same place."""
+    """Whether two effects of unlike families act at one site and are blamed on the same place, or on the same ones in
+    another order: a load and a shifted centre both move heave and pitch.
+    """
     if family_of(law[0]) == family_of(other[0]) or law[1] != other[1]:
         return False
     one, two = (problem.model.places(Active(*p, ())) for p in (law, other))
-    return one[:1] == two[:1]
+    return one[:1] == two[:1] or set(one) == set(two)
