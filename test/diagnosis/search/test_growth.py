@@ -7,18 +7,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pytest
 from helpers.driven_log import DrivenLog
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, refreshed, secant
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import _one_exchanged, grow
+from pneumo_ros.diagnosis.search.parts import rival
 from pneumo_ros.diagnosis.search.screening import compatible
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.rig import load_rig
 
 ROWS, PERIOD, NOISE = 4000, 5e-3, 0.02
 RNG = np.random.default_rng(11)
@@ -153,3 +157,17 @@ def test_sensors_fail_one_at_a_time_and_sites_do_not_overlap() -> None:
     assert not compatible(model, ("gauge", "left"), ("scale", "right"))
     assert not compatible(model, ("gauge", "left"), ("gauge", "right"))
     assert not compatible(model, ("a", ""), ("a", ""))
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "rivals"),
+    [
+        (("payload", ""), ("cg_shift", ""), True),  # both move heave and pitch, each blamed on another of them first
+        (("leak", "front"), ("orifice_coefficient", "front"), True),
+        (("leak", "front"), ("orifice_coefficient", "rear"), False),
+        (("leak", "front"), ("coulomb_friction", "front"), False),
+    ],
+)
+def test_rivals_act_at_one_site_on_the_same_places(one: Part, other: Part, rivals: bool) -> None:
+    problem = Problem(RigModel(load_rig()), ())
+    assert rival(problem, one, other) is rival(problem, other, one) is rivals
