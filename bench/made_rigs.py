@@ -6,8 +6,8 @@
 Each rig is a model of one's own (rig.py, rig.yaml as a user writes them) and two logs, one held out, made by another
 program: a sledge on a guide, an oscillator at 68 Hz whose spring hardens (after Wigren and Schoukens's Silverbox), a
 joint with Bouc-Wen hysteresis (after Noel and Schoukens), two tanks that overflow (after Schoukens et al.), a speed
-whose sensor has lost its sign, valves, stops, sensors and actuators. One line a log, then the counts; ``part`` names
-some of what is there.
+whose sensor has lost its sign, a heated plate, a motor, a quarter car, valves, stops, sensors and actuators. One line a
+log, then the counts; ``part`` names some of what is there.
 """
 
 from __future__ import annotations
@@ -502,6 +502,187 @@ def boat(rng: Generator) -> Columns:
     return {"t": t, "v": v + rng.normal(0.0, 0.004, len(t)), "thrust": np.array([drive(one) for one in t])}
 
 
+HEATER = (
+    SLOTS
+    + """
+SLOTS = [
+    Flow("case", up=lambda x, u, p: x.plate, down=lambda x, u, p: u.room, gas=False, unit="W", pressure_unit="K"),
+    Input("power"),
+    Sensor("plate"),
+]
+
+
+def rhs(x, u, p, f):
+    return ((u.power - p.loss * (x.plate - u.room) - f.case) / p.capacity,)
+
+
+def outputs(x, u, p, f):
+    return (x.plate,)
+"""
+)
+HEATER_NAMES = """
+rig: heated plate
+time: {field: t, unit: s}
+channels: {plate: {unit: degC}}
+inputs: {power: {unit: W}, room: {unit: degC}}
+states: {plate: plate}
+parameters: {capacity: 400 +- 20 J/K, loss: 0.6 +- 0.05 W/K}
+"""
+
+
+def heater(rng: Generator) -> Columns:
+    """Radiation beside convection: a way out for heat, of another law."""
+    t = np.arange(0.0, 7200.0, 5.0)
+    power = levels(rng, 7200.0, 24, 10.0, 140.0)
+    room = 21.0 + np.cumsum(rng.normal(0.0, 0.02, len(t)))
+
+    def rates(time: float, y: Array) -> list[float]:
+        around = float(np.interp(time, t, room))
+        radiated = 5.67e-8 * 0.9 * 0.09 * ((y[0] + 273.15) ** 4 - (around + 273.15) ** 4)
+        return [(power(time) - 0.6 * (y[0] - around) - radiated) / 400.0]
+
+    plate = run(rates, (room[0],), t, 5.0)[0] + rng.normal(0.0, 0.1, len(t))
+    return {"t": t, "plate": plate, "power": np.array([power(one) for one in t]), "room": room}
+
+
+MOTOR = (
+    SLOTS
+    + """
+SLOTS = [
+    Force("bearing", travel=lambda x, u, p: x.angle, rate=lambda x, u, p: x.speed, unit="N m", travel_unit="rad"),
+    Input("voltage"),
+    Sensor("current"),
+    Sensor("speed"),
+]
+
+
+def rhs(x, u, p, f):
+    current = (u.voltage - p.resistance * x.current - p.constant * x.speed) / p.inductance
+    return current, (p.constant * x.current - p.damping * x.speed + f.bearing) / p.inertia, x.speed
+
+
+def outputs(x, u, p, f):
+    return x.current, x.speed
+"""
+)
+MOTOR_NAMES = """
+rig: motor
+time: {field: t, unit: s}
+channels: {current: {unit: A}, speed: {unit: rpm}}
+inputs: {voltage: {unit: V}}
+states: {current: current, speed: speed, angle: 0}
+parameters: {resistance: 1.2 +- 0.08 ohm, constant: 0.05 +- 0.001 N m/A, inductance: 2e-3 +- 2e-4 H,
+  inertia: 1e-4 +- 5e-6 kg m2, damping: 2e-5 +- 5e-6 N m s/rad}
+"""
+
+
+def motor(rng: Generator) -> Columns:
+    """Friction that is larger from rest; the current's sensor reads 6 % too much."""
+    t = np.arange(0.0, 12.0, 0.002)
+    drive = several(rng, (6.0, 4.0, 2.5), (0.4, 1.3, 3.1))
+
+    def rates(time: float, y: Array) -> list[float]:
+        rub = (0.012 + 0.008 * np.exp(-((y[1] / 4.0) ** 2))) * np.tanh(y[1] / 0.3)
+        return [(drive(time) - 1.2 * y[0] - 0.05 * y[1]) / 2e-3, (0.05 * y[0] - 2e-5 * y[1] - rub) / 1e-4]
+
+    current, speed = run(rates, (0.0, 0.0), t, 5e-4)
+    shown, turns = 1.06 * current + rng.normal(0.0, 0.01, len(t)), 30.0 / np.pi * speed + rng.normal(0.0, 1.0, len(t))
+    return {"t": t, "current": shown, "speed": turns, "voltage": np.array([drive(one) for one in t])}
+
+
+LEVEL = (
+    SLOTS
+    + """
+SLOTS = [
+    Flow("outlet", up=lambda x, u, p: x.level, flow=lambda x, u, p: p.drain * math.sqrt(max(x.level, 0.0)), gas=False,
+         unit="m3/s", pressure_unit="m"),
+    Input("valve"),
+    Sensor("level"),
+]
+
+
+def rhs(x, u, p, f):
+    return ((p.feed * u.valve - p.drain * math.sqrt(max(x.level, 0.0)) - f.outlet) / p.area,)
+
+
+def outputs(x, u, p, f):
+    return (x.level,)
+"""
+)
+LEVEL_NAMES = """
+rig: tank behind a valve
+time: {field: t, unit: s}
+channels: {level: {unit: m}}
+inputs: {valve: {unit: "1"}}
+states: {level: level}
+parameters: {feed: 2e-4 +- 4e-6 m3/s, drain: 1e-4 +- 3e-6, area: 0.02 +- 4e-4 m2}
+"""
+
+
+def level(rng: Generator) -> Columns:
+    """The valve's stem has play; what is logged is what it was told."""
+    t = np.arange(0.0, 3000.0, 2.0)
+    told = np.array([levels(rng, 3000.0, 70, 0.1, 0.9)(one) for one in t])
+    stem = told.copy()
+    for k in range(1, len(t)):
+        stem[k] = min(max(stem[k - 1], told[k] - 0.06), told[k] + 0.06)
+
+    def rates(time: float, y: Array) -> list[float]:
+        return [(2e-4 * float(np.interp(time, t, stem)) - 1e-4 * np.sqrt(max(y[0], 0.0))) / 0.02]
+
+    return {"t": t, "level": run(rates, (1.0,), t, 2.0)[0] + rng.normal(0.0, 3e-3, len(t)), "valve": told}
+
+
+QUARTER = (
+    SLOTS
+    + """
+SLOTS = [
+    Force("strut", travel=lambda x, u, p: x.body - x.wheel, rate=lambda x, u, p: x.vb - x.vw),
+    Contact("tyre", travel=lambda x, u, p: x.wheel - u.road, rate=lambda x, u, p: x.vw,
+            load=lambda x, u, p: 9.81 * (p.sprung + p.unsprung) - p.kt * (x.wheel - u.road)),
+    Input("road"),
+    Sensor("body"),
+    Sensor("wheel"),
+]
+
+
+def rhs(x, u, p, f):
+    strut = -p.k * (x.body - x.wheel) - p.c * (x.vb - x.vw) + f.strut
+    return x.vb, x.vw, strut / p.sprung, (-strut - p.kt * (x.wheel - u.road) + f.tyre) / p.unsprung
+
+
+def outputs(x, u, p, f):
+    return x.body, x.wheel
+"""
+)
+QUARTER_NAMES = """
+rig: quarter car
+time: {field: t, unit: s}
+channels: {body: {unit: mm}, wheel: {unit: mm}}
+inputs: {road: {unit: mm}}
+states: {body: body, wheel: wheel, vb: rate of body, vw: rate of wheel}
+parameters: {k: 16000 +- 600 N/m, c: 1000 +- 60 N s/m, kt: 160000 +- 6000 N/m, sprung: 250 +- 5 kg,
+  unsprung: 35 +- 1 kg}
+"""
+
+
+def quarter(family: str, damper: Callable[[float], float]) -> Made:
+    """A passenger car's quarter with a damper by force (rate) of its own."""
+
+    def log(rng: Generator) -> Columns:
+        t = np.arange(0.0, 16.0, 0.004)
+        road = several(rng, (0.02, 0.012, 0.006, 0.003), (0.7, 1.6, 4.0, 9.5))
+
+        def rates(time: float, y: Array) -> list[float]:
+            strut = -16000.0 * (y[0] - y[1]) - damper(y[2] - y[3])
+            return [y[2], y[3], strut / 250.0, (-strut - 160000.0 * (y[1] - road(time))) / 35.0]
+
+        body, wheel = 1e3 * run(rates, np.zeros(4), t, 1e-3)[:2] + rng.normal(0.0, 0.05, (2, len(t)))
+        return {"t": t, "body": body, "wheel": wheel, "road": 1e3 * np.array([road(one) for one in t])}
+
+    return Made(QUARTER, QUARTER_NAMES, log, frozenset({family}))
+
+
 RIGS = {
     "nothing": mass(()),
     "dead zone": mass(("dead_zone",), actuator=lambda u: beyond(u, 0.9)),
@@ -522,6 +703,12 @@ RIGS = {
     "pendulum": Made(PENDULUM, PENDULUM_NAMES, pendulum, frozenset({"coulomb_friction"})),
     "bush": Made(BUSH, BUSH_NAMES, bush, frozenset({"relaxation"})),
     "boat": Made(BOAT, BOAT_NAMES, boat, frozenset({"viscous_damping"})),
+    "heater": Made(HEATER, HEATER_NAMES, heater, frozenset({"leak"})),
+    "motor": Made(MOTOR, MOTOR_NAMES, motor, frozenset({"coulomb_friction", "scale"})),
+    "level": Made(LEVEL, LEVEL_NAMES, level, frozenset({"backlash"})),
+    "uneven damper": quarter("viscous_damping", lambda v: (1600.0 if v > 0.0 else 700.0) * v),
+    "degressive damper": quarter("viscous_damping", lambda v: 1000.0 * v + 500.0 * float(np.tanh(v / 0.15))),
+    "bush that rubs": quarter("coulomb_friction", lambda v: 1000.0 * v + 90.0 * float(np.tanh(v / 2e-3))),
 }
 
 

@@ -153,10 +153,12 @@ def _static_error(x: Array, rest: float, swing: float, powers: Sequence[int], va
     z = (x - rest) / swing
     out = np.zeros_like(z)
     for value, power in zip(values, powers, strict=False):
-        out += value * z**power
+        if value != 0.0:
+            out += value * z**power
     for k, kink in enumerate(KINKS):
         above, below = values[len(powers) + 2 * k : len(powers) + 2 * k + 2]
-        out += above * np.maximum(z - kink, 0.0) + below * np.minimum(z + kink, 0.0)
+        if above != 0.0 or below != 0.0:
+            out += above * np.maximum(z - kink, 0.0) + below * np.minimum(z + kink, 0.0)
     return np.asarray(swing * out)
 
 
