@@ -42,7 +42,8 @@ class EffectEvidence:
     ceiling : gap left when whatever may act at its places is added
     share : what it holds of what the refit leaves
     leaves : what the structure leaves over what is left with whatever may act at its places: held-out gaps with nothing
-        subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated
+        subtracted, :data:`SLACK` of what there was to close aside; 1 where no model form is stated, and where no more
+        is left than that and the sensors leave
     beside : the same beside whatever may act where most of the rest lies, over what it holds without that; 1 where no
         such place is known
     instead : gap left by whatever may act there in place of the effect, over what the structure leaves, rms; 1 where
@@ -133,7 +134,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         evidence.append(EffectEvidence(
             law, where, _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
-            leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated else 1.0,
+            leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         ))  # fmt: skip
     if places:  # together, what is left may need them all; alone, one of them may do
         added(tuple(places[:TOGETHER]))
