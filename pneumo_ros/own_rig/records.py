@@ -275,9 +275,9 @@ def first_values(record: OwnRecord, column: Array, noise: float) -> tuple[Array,
     for rows in sizes:
         with np.errstate(over="ignore", invalid="ignore"):  # what a wild sensor error makes of a log
             found, white, bend, doubt = _at_first_row(column[:rows], noise, record.period)
-        # The longest may agree by chance: what bent less rows beyond their noise counts.
-        bends = np.maximum(bends, np.maximum(bend - 2.0 * doubt, 0.0))
-        std = np.hypot(white, np.maximum(bends, bend))
+            # The longest may agree by chance: what bent less rows beyond their noise counts.
+            bends = np.maximum(bends, np.maximum(bend - 2.0 * doubt, 0.0))
+            std = np.hypot(white, np.maximum(bends, bend))
         if best is None or std[1] < best[1][1]:
             best = found, std
     assert best is not None
