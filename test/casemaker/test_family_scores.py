@@ -124,6 +124,10 @@ def test_curves_cover_where_data_are_dense() -> None:
     assert f.coverage(CURVE, measured(-1.0, 1.0)) == 1.0
     assert f.coverage(CURVE, measured(0.5, 1.0)) == 0.0
     assert f.coverage(CURVE, measured(-1.0, 1.0, unit="Pa")) is None
+    leak = {**CURVE, "x": {**CURVE["x"], "name": "pressure"}}  # what is lost; the diagnosis tells what comes in
+    turned = [[x, -y, -high, -low, weight] for x, y, low, high, weight in measured(-1.0, 1.0)["points"]]
+    assert f.coverage(leak, {**measured(-1.0, 1.0), "points": turned}) == 1.0
+    assert f.coverage(leak, measured(-0.01, 0.01)) == 0.0
     assert f.coverage(None, measured(-1.0, 1.0)) is None
     assert f.coverage(CURVE, None) is None
     truth = [item("viscous_damping", 0.4, 1.0)]
