@@ -274,8 +274,12 @@ def _of_one_size(refit: Scored, some: Sequence[Scored], calibration: Calibration
 def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration) -> float:
     """Probability that what the refit leaves is the work of something without a name, where no effect was chosen.
 
+    What stays within a model form that is stated or assumed, on the held-out log, is nothing's.
+
     ``level_refit`` : mean square on the selection blocks, sigmas
     """
+    if held.form > 0.0 and held.refit <= 1.0:
+        return 0.0
     c = calibration
     share = (level_refit / c.real) ** (0.5 * c.steepness)
     share += (beyond(held.refit, 1.0) / beyond(c.held_real, 1.0)) ** c.steepness

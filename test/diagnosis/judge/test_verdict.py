@@ -245,3 +245,10 @@ def test_a_certain_credit_is_told_as_often_as_such_were_right_and_a_half_stays_a
     assert told_probability(0.0, 1.0, 1.0, c) == 0.45 and told_probability(0.0, 1.0, 0.0, c) == 0.0
     steps = [told_probability(p, 0.2, 0.9, c) for p in np.linspace(0.0, 1.0, 51)]
     assert np.all(np.diff(steps) > 0.0)
+
+
+@pytest.mark.parametrize(("form", "verdict"), [(0.9, "none"), (0.0, "unknown")])
+def test_what_the_held_out_log_keeps_within_the_form_is_nothings(form: float, verdict: str) -> None:
+    """One kept block of the fitted log leaves more, the held-out log less than the form is worth."""
+    refit = scored(400.0, 3.0)
+    assert judge(refit, [], refit, Calibration(), HeldOutGaps(0.7, 0.7, form)).verdict == verdict
