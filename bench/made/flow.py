@@ -175,7 +175,7 @@ parameters: {feed: 2e-4 +- 4e-6 m3/s, drain: 1e-4 +- 3e-6, area: 0.02 +- 4e-4 m2
 def level(rng: Generator) -> Columns:
     """The valve's stem has play; what is logged is what it was told."""
     t = np.arange(0.0, 3000.0, 2.0)
-    told = np.array([levels(rng, 3000.0, 70, 0.1, 0.9)(one) for one in t])
+    told = sampled(levels(rng, 3000.0, 70, 0.1, 0.9), t)
     stem = told.copy()
     for k in range(1, len(t)):
         stem[k] = min(max(stem[k - 1], told[k] - 0.06), told[k] + 0.06)

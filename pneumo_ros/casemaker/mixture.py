@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pneumo_ros.casemaker.catalogue import get, known_effects, laws_of, outside_all
-from pneumo_ros.casemaker.planned import GRADES, IMPERFECT_SHARE, RIVALS, Planned, drawn_side
+from pneumo_ros.casemaker.planned import GRADES, IMPERFECT_SHARE, RIVALS, Planned, case_prefix, drawn_side
 
 Acting = tuple[str, "str | None", str]  # id, side, law
 
@@ -47,7 +47,7 @@ MIXTURES: dict[str, Mixture] = {
 
 def mixture(name: str) -> tuple[Planned, ...]:
     """The cases of a set of 0.4 or later, in its public order."""
-    mix, prefix = MIXTURES[name], name.removesuffix("-0.4")  # cases keep the names they had
+    mix, prefix = MIXTURES[name], case_prefix(name)
     rng = np.random.default_rng(mix.seed)
     drafts = [*_bare(mix), *_singles(mix, rng), *_several(mix, rng), *_outside(mix, rng), *_mixed(mix, rng)]
     order = rng.permutation(len(drafts))

@@ -9,7 +9,7 @@ import numpy as np
 
 from pneumo_ros.casemaker.catalogue import known_effects, unknown_kinds
 from pneumo_ros.casemaker.mixture import MIXTURES, mixture
-from pneumo_ros.casemaker.planned import GRADES, IMPERFECT_SHARE, RIVALS, Planned, drawn_side
+from pneumo_ros.casemaker.planned import GRADES, IMPERFECT_SHARE, RIVALS, Planned, case_prefix, drawn_side
 from pneumo_ros.errors import InputError
 
 
@@ -71,7 +71,7 @@ def plan(name: str) -> tuple[Planned, ...]:
     if name not in SETS:
         allowed = ", ".join((*MIXTURES, *SETS, "ci"))
         raise InputError("unknown set", key="set", value=name, allowed=allowed, remedy="choose one of them")
-    mix, prefix = SETS[name], "full" if name == "full-0.3" else name  # cases keep the names they had
+    mix, prefix = SETS[name], case_prefix(name)
     rng = np.random.default_rng(mix.seed)
     drafts = _none(mix) + _single(mix, rng) + _pairs(mix, rng) + _unknown(mix, rng) + _withheld(mix, rng)
     drafts = _with_decoys(drafts, mix.decoys, rng)

@@ -54,6 +54,11 @@ class Planned:
     budgeted: bool = False
 
 
+def case_prefix(name: str) -> str:
+    """What the names of a set's cases begin with: those of a full set are ``full-001`` and on, in its own folder."""
+    return "full" if name in ("full-0.3", "full-0.4") else name  # the sets before kept their numbers
+
+
 def drawn_side(name: str, rng: np.random.Generator) -> str | None:
     sides = get(name).sides
     return sides[int(rng.integers(len(sides)))]

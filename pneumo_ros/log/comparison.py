@@ -188,6 +188,7 @@ def _unit(topic: Topic | None, column: str) -> str:
     return f"{unit}/s" if unit and "velocity" in column.split(".") else unit
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a log may hold any number, infinite ones too
 def _signal(
     topic: str, column: str, values: tuple[NDArray[Any], NDArray[Any]], times: tuple[NDArray[Any], NDArray[Any]],
     unit: str,

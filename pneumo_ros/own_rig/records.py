@@ -270,18 +270,14 @@ def first_values(record: OwnRecord, column: Array, noise: float) -> tuple[Array,
     steps = np.abs(np.diff(column[:most]))
     noise = max(noise, float(np.min(steps, where=steps > 0.0, initial=np.inf)) / np.sqrt(12.0) if steps.any() else 0.0)
     sizes = np.unique(np.geomspace(min(FIRST[0], most), most, WINDOWS).round().astype(int))
-    best: tuple[Array, Array] | None = None
-    bends = np.zeros(2)
+    bends, windows = np.zeros(2), []
     for rows in sizes:
         with np.errstate(over="ignore", invalid="ignore"):  # what a wild sensor error makes of a log
             found, white, bend, doubt = _at_first_row(column[:rows], noise, record.period)
             # The longest may agree by chance: what bent less rows beyond their noise counts.
             bends = np.maximum(bends, np.maximum(bend - 2.0 * doubt, 0.0))
-            std = np.hypot(white, np.maximum(bends, bend))
-        if best is None or std[1] < best[1][1]:
-            best = found, std
-    assert best is not None
-    return best
+            windows.append((found, np.hypot(white, np.maximum(bends, bend))))
+    return min(windows, key=lambda window: float(window[1][1]))
 
 
 def _at_first_row(rows: Array, noise: float, period: float) -> tuple[Array, Array, Array, Array]:

@@ -311,6 +311,7 @@ def _run(
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a log may hold any number, infinite ones too
 def _agreement(log: Log, topic: Topic, found: Track) -> Agreement:
     encode = JointEncoder(topic.frame_id, topic.names).encode
     recorded, payloads = track(log, topic), _payloads(log, topic) or {}

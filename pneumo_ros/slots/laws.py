@@ -22,7 +22,7 @@ class End(Enum):
 
     OWN = "another law of the family"  # nothing
     OTHER = "another family: a hysteresis that yields at once is dry friction"  # as much as a size that is none
-    LIMIT = "the end of what is tried"  # half of that
+    LIMIT = "the end of what is tried"  # half of that for what shapes a law; a size counts in full
 
 
 @dataclass(frozen=True)

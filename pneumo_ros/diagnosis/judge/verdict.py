@@ -93,6 +93,11 @@ class HeldOutGaps:
     chosen: float
     form: float = 0.0
 
+    @property
+    def within_form(self) -> bool:
+        """Whether a model form is stated or assumed and the refit leaves no more than it: nothing is missed."""
+        return self.form > 0.0 and self.refit <= 1.0
+
 
 @dataclass(frozen=True)
 class Opinion:
@@ -151,7 +156,7 @@ def judge(
         unknown = unexplained(refit.level, held, calibration)
         scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
-    worse = held.chosen >= held.refit or (held.form > 0.0 and held.refit <= 1.0)
+    worse = held.chosen >= held.refit or held.within_form
     trust = _beside_unnamed({one.law: 0.0 if worse else credit(one, held, calibration) for one in evidence}, evidence)
     trusted = max(trust.values(), default=0.0)
     unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)
@@ -278,7 +283,7 @@ def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration)
 
     ``level_refit`` : mean square on the selection blocks, sigmas
     """
-    if held.form > 0.0 and held.refit <= 1.0:
+    if held.within_form:
         return 0.0
     c = calibration
     share = (level_refit / c.real) ** (0.5 * c.steepness)
