@@ -41,6 +41,7 @@ from pneumo_ros.rig.channels import CHANNELS
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
 COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
 Memories = tuple[Memory, ...]  # one an effect; empty before the first block
+PLANTS = 64  # kept at a time
 NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 
@@ -227,13 +228,31 @@ class RigModel:
 
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""
-        v = {} if nuisance is None else dict(zip((p.name for p in self.parameters), map(float, nuisance), strict=True))
-        plant = plant_with(self.rig, self._base, {**dict(self.rig.ends), **v})
+        plant = self._plant_with(nuisance)
         for one in (*self.configured, *active):
             effect = self.library[one.effect]
             if effect.plant is not None:
                 plant = effect.plant(plant, ends_of(one.site), one.values)
         return plant
+
+    def _plant_with(self, nuisance: Array | None) -> Plant:
+        key = b"" if nuisance is None else np.asarray(nuisance, dtype=float).tobytes()
+        plant = self._plants.get(key)
+        if plant is None:
+            values = (
+                () if nuisance is None else zip((p.name for p in self.parameters), map(float, nuisance), strict=True)
+            )
+            plant = plant_with(self.rig, self._base, {**dict(self.rig.ends), **dict(values)})
+            if len(self._plants) >= PLANTS:
+                self._plants.clear()
+            self._plants[key] = plant
+        return plant
+
+    @cached_property
+    def _plants(self) -> dict[bytes, Plant]:
+        """Equations by the nuisance values lately asked for: a simulation asks four times, a Jacobian for one beside
+        each of the others."""
+        return {}
 
     @cached_property
     def slots(self) -> tuple[Slot, ...]:

@@ -91,11 +91,16 @@ def make_windows(rows: int, period: float, half_width: float = HALF_WIDTH) -> Wi
     return Windows(np.arange(reach, rows - reach - 1, reach), window)
 
 
+@njit(cache=True)
 def averaged(series: Array, kernel: Array, centres: NDArray[np.intp]) -> Array:
-    """Sum of ``series`` (N,) under a window's ``kernel`` at each centre, (K,)."""
-    reach = len(kernel) // 2
-    framed = np.lib.stride_tricks.sliding_window_view(series, len(kernel))
-    return np.asarray(framed[centres - reach] @ kernel)
+    """Sum of ``series`` (N,) under a window's ``kernel`` at each of the ``centres``' rows, (K,)."""
+    out = np.empty(len(centres))
+    for k in range(len(centres)):
+        first, total = centres[k] - len(kernel) // 2, 0.0
+        for i in range(len(kernel)):
+            total += kernel[i] * series[first + i]
+        out[k] = total
+    return out
 
 
 @njit(cache=True, error_model="numpy")
