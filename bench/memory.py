@@ -31,11 +31,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=8.0, help="simulated")
     parser.add_argument("--patience", type=float, default=1e9, help="s after which it is ended by Ctrl-C")
+    parser.add_argument("--single-process", action="store_true", help="all nodes in one process")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "session.mcap"
         command = [sys.executable, "-m", MODULE, "run", "--isolate", "--no-picture", "--no-report", "--duration",
                    str(options.hours * 3600.0), "--output", str(log)]  # fmt: skip
+        command += ["--single-process"] if options.single_process else []
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         said: list[str] = []
         threading.Thread(target=lambda: said.extend(process.stdout or ()), daemon=True).start()
