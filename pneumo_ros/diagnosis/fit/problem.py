@@ -8,11 +8,10 @@ every log in prior sigmas, effect values in their typical sizes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.pace import Pace
 from pneumo_ros.diagnosis.fit.record_pace import shared_pace
+from pneumo_ros.diagnosis.fit.together import Done, Item, each
 from pneumo_ros.diagnosis.model import Model, Record, parameters_at
 from pneumo_ros.diagnosis.traits import HasCoarse, HasModelForm, HasScale, HasSlowNoise
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
@@ -34,8 +34,6 @@ INITIAL_WIDENING: Final = 3.0
 SELECT_EVERY: Final = 3  # one of so many blocks is kept from the fit and used for selection [taste]
 
 Part = tuple[str, str]  # effect id, site
-Item = TypeVar("Item")
-Done = TypeVar("Done")
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ class Problem:
 
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
         """``work`` done on each item, in their order, several at a time."""
-        return list(_pool(self.threads).map(work, items)) if self.threads > 1 else [work(item) for item in items]
+        return each(self.threads, work, items)
 
     @cached_property
     def pace(self) -> Pace:
@@ -274,11 +272,6 @@ class Problem:
         """(n, C) measured - predicted, in sigmas."""
         with np.errstate(over="ignore", invalid="ignore"):  # a run that runs away: its cost is infinite
             return (self.measured - self.predict(candidate, x)) * self.weight
-
-
-@lru_cache(maxsize=2)
-def _pool(threads: int) -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(threads, "simulation")
 
 
 def stated_form(record: Record) -> float:

@@ -118,30 +118,27 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     left = held_by(problem, best, holdout).total
     own = _above(left, floor)
     stated = stated_form(holdout) > 0.0
-    remainders: dict[tuple[str, ...], Remainder] = {}
+    at = {law: problem.model.places(Active(*law, ())) for law in best.candidate.laws}
+    # Of what is left, together: it may need them all; and alone: one of them may do.
+    beyond = [tuple(places[:TOGETHER]), (places[0],)] if places else []
+    wheres = list(dict.fromkeys([*at.values(), *beyond]))
+    added = problem.each(lambda where: _anything(problem, best, holdout, floor, where, left), wheres)
+    remainders = dict(zip(wheres, added, strict=True))
 
-    def added(where: tuple[str, ...]) -> Remainder:
-        if where not in remainders:
-            remainders[where] = _anything(problem, best, holdout, floor, where, left)
-        return remainders[where]
-
-    evidence = []
-    for law in best.candidate.laws:
-        where = problem.model.places(Active(*law, ()))
+    def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
-        without, ceiling = held_by(problem, bare, holdout).total, added(where)
+        without, ceiling = held_by(problem, bare, holdout).total, remainders[at[law]]
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
-        evidence.append(EffectEvidence(
-            law, where, _above(without, floor), own, ceiling.gap,
+        return EffectEvidence(
+            law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
-        ))  # fmt: skip
-    if places:  # together, what is left may need them all; alone, one of them may do
-        added(tuple(places[:TOGETHER]))
-        added((places[0],))
+        )  # fmt: skip
+
+    evidence = problem.each(judged, best.candidate.laws)
     found = sorted((r for r in remainders.values() if r.gap < own), key=lambda r: r.gap)
     if found and found[0].gap < (1.0 - WORTH) * own:
-        evidence = [_beside(problem, best, holdout, floor, one, found[0]) for one in evidence]
+        evidence = problem.each(lambda one: _beside(problem, best, holdout, floor, one, found[0]), evidence)
     return Closable(tuple(evidence), tuple(found), own)
 
 

@@ -32,13 +32,17 @@ def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:
     out = [replace(nominal, evidence=_weighed(outcome.refit))]
     if opinion.unknown > 1e-3:
         out.append(_plain(("unknown",), opinion.unknown, refit.total, fitted))
-    by_weight = sorted(outcome.finalists, key=lambda one: -log_weight(one, outcome.refit))
-    for scored in sorted(by_weight, key=lambda one: -opinion.named[one.fit.candidate])[:TOLD]:
+
+    def ranked(scored: Scored) -> Ranked:
         same = best is not base and scored.fit.candidate == best.candidate
         one = best if same else refreshed(problem, scored.fit)
         run = outcome.runs["best"] if same else held_by(problem, one, holdout)
-        ranked = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
-        out.append(replace(ranked, evidence=_weighed(scored)))
+        told = _ranked(problem, one, opinion.named[one.candidate], run, refit, holdout)
+        return replace(told, evidence=_weighed(scored))
+
+    by_weight = sorted(outcome.finalists, key=lambda one: -log_weight(one, outcome.refit))
+    by_probability = sorted(by_weight, key=lambda one: -opinion.named[one.fit.candidate])
+    out += problem.each(ranked, by_probability[:TOLD])
     return sorted(out, key=lambda r: -r.probability)
 
 

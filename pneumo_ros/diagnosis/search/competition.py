@@ -31,7 +31,7 @@ from pneumo_ros.diagnosis.search.fitting import (
     short_fits,
     varied,
 )
-from pneumo_ros.diagnosis.search.parts import rival, with_shapes
+from pneumo_ros.diagnosis.search.parts import rival, shaped
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
@@ -73,7 +73,7 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     _run_singles(search)
     _time_jumps(search)
     search.progress(0.55, "shapes")
-    leading = [with_shapes(search.problem, one) for one in search.singles[:SHAPED]]
+    leading = shaped(search.problem, search.singles[:SHAPED])
     search.structures = [*leading, *_rivals_of_first(search)]
     if pairs and search.singles and room_for_more(search) and not _one_suffices(search):
         _run_pairs(search)
@@ -133,7 +133,7 @@ def _rivals_of_first(search: Search) -> list[Fit]:
         if family_of(law[0]) not in taken and rival(problem, leader, law):
             rivals.setdefault(family_of(law[0]), entry)
     short = short_fits(search, search.refit, list(rivals.values())[:RIVALS], (0.56, 0.58))
-    return [with_shapes(problem, one, search.effort.long) for one in short]
+    return shaped(problem, short, search.effort.long)
 
 
 def _time_jumps(search: Search) -> None:
@@ -142,15 +142,17 @@ def _time_jumps(search: Search) -> None:
     if moved is search.problem:
         return
     search.problem = moved
-    again = [fit(moved, f.candidate, f.x, f.jacobian, iterations=search.effort.long) for f in search.laws]
+
+    def again(found: Sequence[Fit], iterations: int) -> list[Fit]:
+        return moved.each(lambda f: fit(moved, f.candidate, f.x, f.jacobian, iterations=iterations), found)
+
+    laws = again(search.laws, search.effort.long)
     search.refit = fit(moved, Candidate(), search.refit.x, search.refit.jacobian)
     singles, pairs = search.effort.finalists, search.effort.pair_finalists
     done = len(search.singles[:singles])
-    search.singles = by_cost(again[:done]) + search.singles[singles:]
-    search.pairs = by_cost(again[done:]) + search.pairs[pairs:]
-    search.structures = [
-        fit(moved, f.candidate, f.x, f.jacobian, iterations=search.effort.short) for f in search.structures
-    ]
+    search.singles = by_cost(laws[:done]) + search.singles[singles:]
+    search.pairs = by_cost(laws[done:]) + search.pairs[pairs:]
+    search.structures = again(search.structures, search.effort.short)
 
 
 def _run_singles(search: Search) -> None:
@@ -165,10 +167,9 @@ def _run_singles(search: Search) -> None:
         likely = _merged(_near_the_log(search), likely)
     chosen = varied(likely, effort.singles, 3)
     short = short_fits(search, search.refit, chosen, (0.1, 0.4))
-    ended = [
-        finished(problem, one, effort, search.refit if k < STARTED_TWICE else None)
-        for k, one in enumerate(short[: effort.finalists])
-    ]
+    anew = [search.refit if k < STARTED_TWICE else None for k in range(effort.finalists)]
+    leading = list(zip(short, anew, strict=False))
+    ended = problem.each(lambda one: finished(problem, one[0], effort, one[1]), leading)
     search.singles = by_cost(ended) + short[effort.finalists :]
 
 
@@ -214,7 +215,7 @@ def _run_pairs(search: Search) -> None:
     found = trials(problem, search.refit, all_parts(problem))
     blind = unseen(candidate_scores(problem, search.refit, found, pairs=True), (), effort.blind_pairs)
     short = by_cost(short + short_fits(search, search.refit, blind, (0.8, 0.85)))
-    ended = [finished(problem, one, effort) for one in short[: effort.pair_finalists]]
+    ended = problem.each(lambda one: finished(problem, one, effort), short[: effort.pair_finalists])
     search.pairs = by_cost(ended) + short[effort.pair_finalists :]
     _exchange_each(search)
     _try_without_each(search)

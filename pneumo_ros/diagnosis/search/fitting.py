@@ -46,7 +46,7 @@ def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> l
     """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
     those end at: the screening is linear, and a typical size may be far from the true one.
     """
-    ranked = [probed_one(problem, base, entry) for entry in screened]
+    ranked = problem.each(lambda entry: probed_one(problem, base, entry), screened)
     return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
 
 
@@ -64,19 +64,20 @@ def short_fits(search: Search, base: Fit, chosen: Sequence[CandidateScore], span
     """Each chosen candidate on top of the base, fitted for ``effort.short`` iterations, lowest training cost first;
     those that diverge are noted in ``search.lost``. ``span`` : share of the whole search done before and after.
     """
-    problem, out = search.problem, []
-    for k, entry in enumerate(chosen):
+    problem = search.problem
+
+    def fitted(numbered: tuple[int, CandidateScore]) -> Fit:
+        k, entry = numbered
         candidate = Candidate((*base.candidate.parts, *entry.parts))
         search.progress(span[0] + (span[1] - span[0]) * k / len(chosen), candidate.label)
         values = [*problem.values(base.candidate, base.x), *entry.values]
         start = problem.start(candidate, base.x[: problem.fixed], values)
         one = fit(problem, candidate, start, base.jacobian, iterations=search.effort.short, shared=len(base.x))
-        one = rescued(problem, one, search.effort.short)
-        if one.diverged:
-            search.lost.append(candidate.label)
-        else:
-            out.append(one)
-    return by_cost(out)
+        return rescued(problem, one, search.effort.short)
+
+    fits = problem.each(fitted, enumerate(chosen))
+    search.lost += [one.candidate.label for one in fits if one.diverged]
+    return by_cost(one for one in fits if not one.diverged)
 
 
 def finished(problem: Problem, short: Fit, effort: Effort, anew: Fit | None = None) -> Fit:

@@ -17,7 +17,7 @@ from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
-from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, with_shapes
+from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, shaped, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
@@ -53,7 +53,7 @@ IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without
 def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     """Add to ``search.structures``: leading pairs with their shapes, and what grows from the best."""
     search.progress(0.82, "shapes")
-    search.structures += [with_shapes(search.problem, one) for one in search.pairs[:SHAPED]]
+    search.structures += shaped(search.problem, search.pairs[:SHAPED])
     best = _selected(search, limits)
     if further and best.size and room_for_more(search):
         _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
@@ -106,7 +106,9 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
 
 def _one_less(problem: Problem, found: Fit) -> Fit | None:
     """The structure without the effect that it misses least, of those it had before the latest."""
-    without = [reduced(problem, found, of_law(found.candidate, law), 2) for law in found.candidate.laws[:-1]]
+    without = problem.each(
+        lambda law: reduced(problem, found, of_law(found.candidate, law), 2), found.candidate.laws[:-1]
+    )
     best = min(without, key=lambda one: one.cost)
     return None if best.diverged else reduced(problem, best, (), STEPS)
 
@@ -118,18 +120,20 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
     of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
     """
     problem = search.problem
-    chosen: list[tuple[float, CandidateScore, Fit]] = []
-    for law in found.candidate.laws:
+
+    def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
         bare = reduced(problem, found, of_law(found.candidate, law), 2)
         if bare.diverged:
-            continue
+            return []
         others = [part for part in _compatible(problem, bare.candidate.laws) if part != law]
         screened = varied(candidate_scores(problem, bare, trials(problem, bare, others)), EXCHANGED[0], 2)
-        probes = [(*probed_one(problem, bare, one), bare) for one in screened]
-        chosen += sorted(probes, key=lambda item: item[0])[:1]
-    chosen = sorted(chosen, key=lambda item: item[0])[: EXCHANGED[1]]
+        probes = problem.each(lambda one: (*probed_one(problem, bare, one), bare), screened)
+        return sorted(probes, key=lambda item: item[0])[:1]
+
+    each = problem.each(instead, found.candidate.laws)
+    chosen = sorted((one for some in each for one in some), key=lambda item: item[0])[: EXCHANGED[1]]
     short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
-    ended = [with_shapes(problem, one, search.effort.short) for one in short]
+    ended = shaped(problem, short, search.effort.short)
     return min(ended, key=lambda one: score(problem, one).price, default=None)
 
 
@@ -146,8 +150,13 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
     chosen = probed(problem, leader, screened)[: counts[1]]
     short = short_fits(search, leader, chosen, (0.86, 0.86))
-    ended = [fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long) for one in short[: counts[2]]]
-    return [with_shapes(problem, one, effort.short) for one in ended]
+
+    def ended(one: Fit) -> Fit:
+        return with_shapes(
+            problem, fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long), effort.short
+        )
+
+    return problem.each(ended, short[: counts[2]])
 
 
 def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
@@ -200,7 +209,7 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     ranked = probed(problem, bare, screened)
     promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
     chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
-    others = [with_shapes(problem, short) for short in short_fits(search, bare, chosen, (0.9, 0.9))]
+    others = shaped(problem, short_fits(search, bare, chosen, (0.9, 0.9)))
     search.structures += others  # the worse ones as well: they may be as likely
     return likeliest(score(problem, search.refit), [score(problem, one) for one in (found, *others)]).fit
 

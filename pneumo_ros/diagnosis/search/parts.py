@@ -26,6 +26,11 @@ def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fi
     return with_parts(problem, one, missing, iterations)
 
 
+def shaped(problem: Problem, found: Sequence[Fit], iterations: int = SHAPE_STEPS) -> list[Fit]:
+    """:func:`with_shapes` of each, several at a time."""
+    return problem.each(lambda one: with_shapes(problem, one, iterations), found)
+
+
 def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
     """Shapes of the families of a structure, where its laws act."""
     named = ((f"{family_of(effect)}.{SHAPE}", site) for effect, site in candidate.laws)
