@@ -15,7 +15,8 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Problem, average
+from pneumo_ros.diagnosis.fit.averaging import average
+from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 
 SEPARATES: Final = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart [taste]

@@ -32,7 +32,7 @@ from pneumo_ros.effects.nuisance import COMMAND_DELAY, NUISANCE, nominal_plant, 
 from pneumo_ros.effects.observed import ideal_channels, rates_of_channels, state_of
 from pneumo_ros.effects.parameters import Active, Curve, Parameter
 from pneumo_ros.effects.shapes.families import anything_at
-from pneumo_ros.effects.switches import kernel_of, room_for_states, slots_of, switches_of
+from pneumo_ros.effects.switches import Layout, kernel_of, layout_of, room_for_states, slots_of, switches_of
 from pneumo_ros.plant.air_spring import AreaSurface, load_surface
 from pneumo_ros.plant.half_car import HalfCar, simulate, substeps
 from pneumo_ros.rig import Rig
@@ -122,14 +122,16 @@ class RigModel:
 
     def initial(self, record: Drive, active: Sequence[Active] = ()) -> tuple[Array, Array]:
         """State at the record's first row: the measured one, seen through the active sensor effects."""
-        state = np.asarray(record.initial, dtype=float)
-        channels, rates = ideal_channels(state, self._base.body), rates_of_channels(state, self._base.body)
-        for one in reversed((*self.configured, *active)):
-            effect = self.library[one.effect]
-            if effect.undo is not None:
-                channels = effect.undo(channels.reshape(1, -1), channels_of(one.site), one.values)[0]
-        body = self.plant(None, active).body
-        return state_of(channels, rates, body), np.asarray(record.initial_std, dtype=float)
+        state, std = np.asarray(record.initial, dtype=float), np.asarray(record.initial_std, dtype=float)
+        nominal, body = self._base.body, self.plant(None, active).body
+        every = [(self.library[one.effect].undo, one) for one in (*self.configured, *active)]
+        undone = [(undo, one) for undo, one in every if undo is not None]
+        if not undone and (body.front_arm, body.rear_arm) == (nominal.front_arm, nominal.rear_arm):
+            return state, std  # the way to the sensors and back again
+        channels, rates = ideal_channels(state, nominal), rates_of_channels(state, nominal)
+        for undo, one in reversed(undone):
+            channels = undo(channels.reshape(1, -1), channels_of(one.site), one.values)[0]
+        return state_of(channels, rates, body), std
 
     def predict(
         self, record: Drive, nuisance: Array, initial: Array, active: Sequence[Active] = (), rows: int | None = None
@@ -278,7 +280,11 @@ class RigModel:
 
     def switches(self, terms: Sequence[Active]) -> tuple[Mask, Array]:
         """Which terms act at which end, (K, 2), and their parameters (K, 2, M), as the kernel takes them."""
-        return switches_of(self.slots, self.library, terms)
+        return switches_of(self._layout, self.library, terms)
+
+    @cached_property
+    def _layout(self) -> Layout:
+        return layout_of(self.slots)
 
 
 def _with_memory(active: Sequence[Active], memory: Memories) -> Iterator[tuple[Active, Memory]]:

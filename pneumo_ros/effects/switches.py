@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,14 +37,25 @@ def room_for_states(slots: Sequence[Slot]) -> Array:
     return np.zeros((max(1, len(slots)), 2, max([1, *(slot.term.states for slot in slots)])))
 
 
-def switches_of(slots: Sequence[Slot], library: Mapping[str, Effect], terms: Sequence[Active]) -> tuple[Mask, Array]:
+class Layout(NamedTuple):
+    """Where each term's parameters lie: its number by name, and the shape (K, 2, M) of all."""
+
+    number: Mapping[str, int]
+    shape: tuple[int, int, int]
+
+
+def layout_of(slots: Sequence[Slot]) -> Layout:
+    """The layout of a kernel's parameters."""
+    most = max([1, *(slot.parameters for slot in slots)])
+    return Layout({slot.name: k for k, slot in enumerate(slots)}, (max(1, len(slots)), 2, most))
+
+
+def switches_of(layout: Layout, library: Mapping[str, Effect], terms: Sequence[Active]) -> tuple[Mask, Array]:
     """Which terms act at which end, (K, 2), and their parameters (K, 2, M), as the kernel takes them."""
-    number = {slot.name: k for k, slot in enumerate(slots)}
-    on = np.zeros((max(1, len(slots)), 2), dtype=np.bool_)
-    values = np.ones((max(1, len(slots)), 2, max([1, *(slot.parameters for slot in slots)])))
+    on, values = np.zeros(layout.shape[:2], dtype=np.bool_), np.ones(layout.shape)
     for one in terms:
         effect = library[one.effect]
-        k = number[effect.place_in_kernel]
+        k = layout.number[effect.place_in_kernel]
         for end in ends_of(one.site).columns:
             if not effect.columns:
                 values[k, end, : len(one.values)] = one.values

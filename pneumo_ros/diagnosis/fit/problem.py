@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.fit.averaging import average, between, grouped
 from pneumo_ros.diagnosis.fit.pace import Pace
 from pneumo_ros.diagnosis.fit.record_pace import shared_pace
 from pneumo_ros.diagnosis.fit.together import Done, Item, each
@@ -188,7 +189,16 @@ class Problem:
 
     def effect_parameters(self, candidate: Candidate) -> tuple[EffectParameter, ...]:
         """Parameters of all its effects, in order."""
-        return tuple(p for part in candidate.parts for p in self.parameters_of[part])
+        found = self._parameters.get(candidate)
+        if found is None:
+            found = tuple(p for part in candidate.parts for p in self.parameters_of[part])
+            self._parameters[candidate] = found
+        return found
+
+    @cached_property
+    def _parameters(self) -> dict[Candidate, tuple[EffectParameter, ...]]:
+        """Of candidates asked for: each of their simulations asks four times."""
+        return {}
 
     def active(self, candidate: Candidate, values: Array) -> tuple[Active, ...]:
         """Its effects with values (SI)."""
@@ -265,7 +275,7 @@ class Problem:
             first = len(self.model.parameters) + k * self.states
             initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
             rows = self.model.predict(record, nuisance, initial, active)
-            out.append(self._averaged(k, _between(rows, len(whole.measured))))
+            out.append(self._averaged(k, between(rows, len(whole.measured))))
         return np.vstack(out)
 
     def residual(self, candidate: Candidate, x: Array) -> Array:
@@ -282,26 +292,6 @@ def stated_form(record: Record) -> float:
 def form_of(record: Record) -> float:
     """Share of a channel's std that the maker's model form is worth, with the floor of any model of this kind."""
     return float(np.hypot(MODEL_FORM_FLOOR, stated_form(record)))
-
-
-def _between(rows: Array, count: int) -> Array:
-    """Every other row given: the ones between by linear interpolation, ``count`` rows in all."""
-    out = np.empty((2 * len(rows) + 1, rows.shape[1]))
-    out[:-1:2] = rows
-    out[1:-2:2] = 0.5 * (rows[:-1] + rows[1:])
-    out[-2:] = rows[-1]
-    return out[:count]
-
-
-def grouped(samples: Array, count: int) -> Array:
-    """Rows in groups of ``count``, (n, count, C); a remainder is dropped."""
-    whole = len(samples) // count
-    return samples[: whole * count].reshape(whole, count, -1)
-
-
-def average(samples: Array, count: int) -> Array:
-    """Means of ``count`` rows; a remainder is dropped."""
-    return np.asarray(np.add.reduce(grouped(samples, count), axis=1) * (1.0 / count))
 
 
 def scale_of(record: Record) -> Array:
