@@ -47,7 +47,7 @@ CASES: dict[str, tuple[tuple[str, str, float], ...]] = {  # effect, site, factor
     "leak": (("leak", "front", 1.0),), "friction": (("coulomb_friction", "rear", 1.0),), "none": (),
     "valve lag": (("valve_lag", "rear", 1.0),), "tyre damping": (("tyre_damping", "both", 1.0),),
     "damping": (("viscous_damping", "front", 1.0),), "lvdt scale": (("lvdt_scale", "sprung_rear", 1.0),),
-    "payload": (("payload", "", 1.0),), "pressure scale": (("pressure_scale", "rear", 1.0),),
+    "payload": (("payload", "", 1.0),), "pressure scale": (("pressure_scale", "rear_pressure", 1.0),),
     "hysteresis": (("bellows_hysteresis", "rear", 1.0),), "delay": (("transport_delay", "", 1.0),),
     "friction and leak": (("coulomb_friction", "rear", 1.0), ("leak", "front", 1.0)),
 }  # fmt: skip

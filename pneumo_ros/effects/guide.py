@@ -18,7 +18,7 @@ _DISPLAYED = {  # SI unit -> factor and unit that people read
     "1/m": (1.0, "/m"),
     "s/m": (1.0, "s/m"),
 }
-_AS_MEASURED = "what the report's measured curve shows"
+_HOW_MUCH = " (how much: the report's measured curve)"
 _NAME = re.compile(r"\{(\w+)\}")
 
 
@@ -41,12 +41,14 @@ class Guide:
         """Parameters that the check names."""
         return set(_NAME.findall(self.check))
 
-    def check_with(self, values: Mapping[str, tuple[float, str]]) -> str:
-        """The check with ``values`` (parameter -> value in SI, and its unit) in place, elsewhere where to look."""
-        return _NAME.sub(lambda found: displayed(*values[found[1]]) if found[1] in values else _AS_MEASURED, self.check)
+    def check_with(self, values: Mapping[str, tuple[float | None, str]]) -> str:
+        """The check with ``values`` (parameter -> value in SI and its unit, None where its number means little)."""
+        text = _NAME.sub(lambda found: displayed(*values[found[1]]), self.check)
+        unsaid = any(values[name][0] is None for name in self.names())
+        return text + _HOW_MUCH if unsaid else text
 
 
-def displayed(value: float, unit: str) -> str:
-    """A value in the unit that people read: ``displayed(0.004, "m")`` is ``4 mm``."""
+def displayed(value: float | None, unit: str) -> str:
+    """A value in the unit that people read: ``displayed(0.004, "m")`` is ``4 mm``; None is ``some mm``."""
     factor, name = _DISPLAYED.get(unit, (1.0, unit))
-    return f"{factor * value:.3g} {name}"
+    return f"some {name}" if value is None else f"{factor * value:.3g} {name}"

@@ -15,6 +15,7 @@ from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
+from pneumo_ros.diagnosis.signals.wiring import check_wiring
 from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
 from pneumo_ros.effects.configured import library_of, with_files
 from pneumo_ros.effects.loading import origins, own_ids
@@ -87,22 +88,29 @@ def prepared(
     else:
         held = read_signals(holdout, rig)
         check_pair(logs, held)
-    _check_runs(model, [*logs, held])
+    logs, held = [_as_wired(model, log) for log in logs], _as_wired(model, held)
     changed = None if edit is None else read_signals(edit)
     if changed is not None:
         notes += _about_edit(model, changed)
     return Task(model, tuple(logs), held, changed, tuple(notes))
 
 
-def _check_runs(model: RigModel, logs: Sequence[Signals]) -> None:
-    """Refuse inputs on which the nominal model diverges from the start: no fit can start from there."""
-    for log in logs:
-        if not np.all(np.isfinite(model.simulate(log))):
-            raise InputError(
-                "the nominal model runs away with this log's road and commands", where=log.name,
-                value=f"road up to {np.max(np.abs(log.road)):.3g} m, openings up to {np.max(log.commands):.3g} m2",
-                remedy="check the units of /road/profile and /valve/command, and the rig",
-            )  # fmt: skip
+def _as_wired(model: RigModel, log: Signals) -> Signals:
+    """The log with what speaks for a sensor or a clock that is not as the contract has it, beside the nominal run.
+
+    Raises
+    ------
+    InputError
+        for inputs on which the nominal model runs away: no fit can start from there.
+    """
+    if not np.all(np.isfinite(model.simulate(log))):
+        raise InputError(
+            "the nominal model runs away with this log's road and commands", where=log.name,
+            value=f"road up to {np.max(np.abs(log.road)):.3g} m, openings up to {np.max(log.commands):.3g} m2",
+            remedy="check the units of /road/profile and /valve/command, and the rig",
+        )  # fmt: skip
+    found = check_wiring(log, model.simulate)
+    return replace(log, limitations=(*log.limitations, *found)) if found else log
 
 
 def _about_edit(model: RigModel, edit: Signals) -> list[str]:

@@ -226,9 +226,9 @@ def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, E
     """
     laws = [e for e in library.values() if family_of(e.id) == family and e.guide is not None]
     for effect in sorted(laws, key=lambda e: e.id):
-        found = {p.name: (_value(parameters, family, p.name), p.unit) for p in effect.parameters}
-        values = {key: (value, unit) for key, (value, unit) in found.items() if value is not None}
-        if effect.guide is not None and (not parameters or effect.guide.names() <= set(values)):
+        values = {p.name: (_value(parameters, family, p.name), p.unit) for p in effect.parameters}
+        known = {name for name, (value, _) in values.items() if value is not None}
+        if effect.guide is not None and (not parameters or effect.guide.names() <= known):
             return effect.guide.check_with(values)
     return ""
 
