@@ -23,6 +23,8 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from pneumo_ros.log.chunks import ChunkedWriter
+from pneumo_ros.log.reading import read_log
+from pneumo_ros.log.topics import EVENTS
 from pneumo_ros.session.summary import load_session, wall_time
 
 LIMIT = 0.03  # of a session's speed that our own writer must gain to be kept
@@ -110,7 +112,7 @@ def session(folder: Path, name: str, duration: float, single: bool) -> tuple[flo
     )  # fmt: skip
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return float(load_session(log).time[-1]) / wall_time(log), used, float(told.read_text())
+    return float(load_session(log).time[-1]) / wall_time(read_log(log, [EVENTS.name])), used, float(told.read_text())
 
 
 def report(where: str, found: dict[str, list[tuple[float, float, float]]], started: float) -> None:

@@ -15,6 +15,8 @@ from pathlib import Path
 
 from bare_ring import HOPS, ring
 
+from pneumo_ros.log.reading import read_log
+from pneumo_ros.log.topics import EVENTS
 from pneumo_ros.nodes.neighbours import claim_place
 from pneumo_ros.session.summary import load_session, wall_time
 
@@ -32,7 +34,7 @@ def speed(folder: Path, duration: float, single: bool) -> float:
          "--output", str(log), *options],
         check=True, stdout=subprocess.DEVNULL,
     )  # fmt: skip
-    return float(load_session(log).time[-1]) / wall_time(log)
+    return float(load_session(log).time[-1]) / wall_time(read_log(log, [EVENTS.name]))
 
 
 def bare(single: bool) -> float:

@@ -79,7 +79,9 @@ def _report(console: Console, target: Path, values: Values, wanted: Wanted) -> N
         png = target.with_suffix(".png")
         draw_session(session, png, other, f"{values['controller']['controller']}, {target.name}")
         console.print(f"picture  {png}", soft_wrap=True)
-    if wanted.page:
+    if wanted.page and session.left_out:
+        console.print(f"report   none of a session this long; pneumo log report {target} makes it", soft_wrap=True)
+    elif wanted.page:
         from pneumo_ros.session.report import write_report
 
         html = target.with_suffix(".html")
@@ -90,12 +92,14 @@ def _report(console: Console, target: Path, values: Values, wanted: Wanted) -> N
 def _summarise(console: Console, target: Path, session: Recorded, other: Recorded | None) -> None:
     """Tables of ride and loops, and what a reader must be warned of."""
     from pneumo_ros.cli.tables import summary_table, timing_table
+    from pneumo_ros.log import topics
     from pneumo_ros.log.reading import read_log
     from pneumo_ros.session.summary import loop_timing, summarise, wall_time
     from pneumo_ros.session.warnings import warnings_of
 
-    loop = loop_timing(target)
-    ours = summarise(session, loop, wall_time(target), warnings_of(read_log(target), loop, session.mode))
+    told = read_log(target, [topics.EVENTS.name, topics.DIAGNOSTIC.name])
+    loop = loop_timing(told)
+    ours = summarise(session, loop, wall_time(told), warnings_of(told, loop, session.mode))
     console.print(summary_table(ours, summarise(other) if other is not None else None))
     console.print(timing_table(ours))
     for line in ours.warnings:

@@ -21,8 +21,8 @@ PERCENTILES = ("p50", "p99", "max")
 
 def summary_table(active: Summary, passive: Summary | None) -> Table:
     """Ride, valves and estimates of a session beside passive valves on the same road."""
-    table = Table(title="After the first second", title_justify="left", box=box.SIMPLE, show_edge=False, pad_edge=False,
-                  padding=0)  # fmt: skip
+    title = active.stretch[0].upper() + active.stretch[1:]
+    table = Table(title=title, title_justify="left", box=box.SIMPLE, show_edge=False, pad_edge=False, padding=0)
     table.add_column("f / r: front / rear", no_wrap=True)
     for column in ("session", "passive", "change") if passive is not None else ("session",):
         table.add_column(column, justify="right", no_wrap=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pneumo_ros.documents import parse_yaml
 from pneumo_ros.errors import InputError
+from pneumo_ros.log.bounds import free_for_messages
 from pneumo_ros.log.container import MAGIC, Contents, DamageError, check_magic
 from pneumo_ros.log.records import Gathered, Records, gather
 from pneumo_ros.log.sections import read_blocks, read_header
@@ -110,7 +111,7 @@ def _listed(folder: Path) -> list[str]:
     return names
 
 
-def read_parts(path: Path, topics: Sequence[str] | None) -> list[Part]:
+def read_parts(path: Path, topics: Sequence[str] | None, since_ns: int = 0) -> list[Part]:
     """Every file of the log.
 
     Raises
@@ -118,17 +119,18 @@ def read_parts(path: Path, topics: Sequence[str] | None) -> list[Part]:
     InputError
         see :func:`pneumo_ros.log.reading.read_log`.
     """
-    return [read_part(file, topics) for file in files_of(path)]
+    return [read_part(file, topics, since_ns) for file in files_of(path)]
 
 
-def read_part(path: Path, topics: Sequence[str] | None) -> Part:
+def read_part(path: Path, topics: Sequence[str] | None, since_ns: int = 0) -> Part:
     """One MCAP file, strictly.
 
     Raises
     ------
     InputError
-        not MCAP, another profile, truncated or damaged.
+        not MCAP, another profile, truncated or damaged; more than fits into memory.
     """
+    most = free_for_messages()
     with mapped(path) as buffer:
         check_magic(buffer, path)
         contents = Contents(path, read_header(buffer, path))
@@ -139,7 +141,14 @@ def read_part(path: Path, topics: Sequence[str] | None) -> Part:
         pieces: dict[int, Gathered] = {}
         total = 0
         for block in read_blocks(buffer, path, contents):
-            total += gather(block, topics, pieces, contents)
+            total += gather(block, topics, pieces, contents, since_ns)
+            if sum(one.size for one in pieces.values()) > most:
+                raise InputError(
+                    "its messages do not fit into memory",
+                    where=path,
+                    allowed=f"{most >> 20} MiB, half of what is free",
+                    remedy="close other programs, or cut a part out with `mcap filter`",
+                )
     statistics = contents.statistics
     if statistics is not None and statistics.message_count != total:
         raise DamageError(

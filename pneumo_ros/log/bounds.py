@@ -7,9 +7,11 @@ memory. The one a real log of another writer may exceed, the chunk's, can be rai
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 from typing import Any
 
 from rosbags.interfaces import Nodetype
@@ -22,7 +24,7 @@ DEFAULT_CHUNK = 256  # MiB
 LARGEST_CHUNK = 4096  # MiB that --max-chunk takes
 MAX_RATIO = 100  # of content to file; zstd makes a quiet log 10 to 20 times smaller
 MAX_CHANNELS = 10_000
-MAX_RECORDS = 1_500_000  # chunks and indexes; two hours of this rig have 800,000
+MAX_RECORDS = 1_500_000  # chunks and indexes, or one per kilobyte of a larger file; two hours of this rig have 800,000
 MAX_DECLARATION = MEBI  # bytes of a schema, channel or metadata record
 MAX_NESTING = 32  # types within types
 MAX_FIELDS = 100_000  # numbers, texts and elements of fixed arrays in one message type
@@ -34,6 +36,20 @@ _limit: ContextVar[int] = ContextVar("chunk_limit", default=DEFAULT_CHUNK * MEBI
 def chunk_limit() -> int:
     """Largest uncompressed chunk that is read, bytes."""
     return _limit.get()
+
+
+def most_records(size: int) -> int:
+    """Chunks and indexes of a file of ``size`` bytes."""
+    return max(MAX_RECORDS, size // 1024)
+
+
+def free_for_messages() -> int:
+    """Bytes of messages that fit into memory: joining a topic's takes as much again for a moment."""
+    try:
+        rows = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines())
+        return int(rows["MemAvailable"].split()[0]) * 1024 // 2
+    except (OSError, KeyError, ValueError):
+        return sys.maxsize
 
 
 def set_chunk_limit(mebibytes: int) -> None:

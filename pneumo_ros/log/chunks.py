@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import FileIO
 
 import numpy as np
@@ -56,7 +56,7 @@ class ChunkedWriter:
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
         self._counts: dict[int, int] = {}
-        self._chunks: list[ChunkIndex] = []
+        self._chunks, self._index = 0, bytearray()  # as it is written: records of a day would take ten times as much
         self._metadata: list[MetadataIndex] = []
         self._pieces: list[bytes] = []
         self._size = 0
@@ -124,15 +124,14 @@ class ChunkedWriter:
         self._put(_encoded(DataEnd(self._crc)))
         start = self._position
         groups = (
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, self._chunks),
-            (Opcode.METADATA_INDEX, self._metadata),
+            (Opcode.SCHEMA, _joined(self._schemas)),
+            (Opcode.CHANNEL, _joined(self._channels)),
+            (Opcode.STATISTICS, _encoded(self._statistics())),
+            (Opcode.CHUNK_INDEX, bytes(self._index)),
+            (Opcode.METADATA_INDEX, _joined(self._metadata)),
         )
         summary, offsets = b"", b""
-        for opcode, records in groups:
-            data = b"".join(_encoded(record) for record in records)
+        for opcode, data in groups:
             offset = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(data))
             offsets += _encoded(offset)
             summary += data
@@ -175,7 +174,8 @@ class ChunkedWriter:
             self._entries[number] = []
         self._first = begin if not self._chunks else min(self._first, begin)
         self._last = max(self._last, end)
-        self._chunks.append(
+        self._chunks += 1
+        self._index += _encoded(
             ChunkIndex(len(data), start, "zstd", len(packed), end, len(indexes), offsets, begin, len(content))
         )
         self._pieces, self._size = [], 0
@@ -185,13 +185,17 @@ class ChunkedWriter:
             attachment_count=0,
             channel_count=len(self._channels),
             channel_message_counts={number: count for number, count in self._counts.items() if count},
-            chunk_count=len(self._chunks),
+            chunk_count=self._chunks,
             message_count=sum(self._counts.values()),
             message_end_time=self._last,
             message_start_time=self._first,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
+
+
+def _joined(records: Sequence[McapRecord]) -> bytes:
+    return b"".join(_encoded(record) for record in records)
 
 
 def _encoded(record: McapRecord) -> bytes:

@@ -45,6 +45,7 @@ class Log:
     metadata : the file's metadata records, in order
     attachments : the file's attachments, in order
     unprotected : True if some content carries no checksum, so that damage in it cannot be seen
+    span_ns : log time of the first and last message, kept or not; None where a file does not say
     """
 
     path: Path
@@ -54,6 +55,7 @@ class Log:
     metadata: tuple[Metadata, ...]
     attachments: tuple[Attachment, ...]
     unprotected: bool
+    span_ns: tuple[int, int] | None
     _records: dict[str, Records] = field(repr=False)
     _columns: dict[str, Columns] = field(default_factory=dict, repr=False)
 

@@ -17,6 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from mcap.records import Statistics
+
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.bags import Part, read_parts
 from pneumo_ros.log.decoded import Log
@@ -24,20 +26,21 @@ from pneumo_ros.log.records import Records, join
 from pneumo_ros.log.topic_data import TopicInfo
 
 
-def read_log(path: str | Path, topics: Sequence[str] | None = None) -> Log:
+def read_log(path: str | Path, topics: Sequence[str] | None = None, since_ns: int = 0) -> Log:
     """Read a log, checking every bound and checksum; a damaged one is refused.
 
     Parameters
     ----------
     path : an .mcap file, or a bag folder
     topics : keep only these (missing ones are not an error here); None keeps all
+    since_ns : log time before which nothing is kept
 
     Raises
     ------
     InputError
         not a log, another profile, truncated or damaged: with the byte it breaks at and the remedy.
     """
-    return assemble(Path(path), read_parts(Path(path), topics))
+    return assemble(Path(path), read_parts(Path(path), topics, since_ns))
 
 
 def assemble(path: Path, parts: Sequence[Part]) -> Log:
@@ -64,8 +67,16 @@ def assemble(path: Path, parts: Sequence[Part]) -> Log:
         metadata=tuple(m for c in contents for m in c.metadata),
         attachments=tuple(a for c in contents for a in c.attachments),
         unprotected=any(c.unprotected for c in contents),
+        span_ns=_span([c.statistics for c in contents]),
         _records=joined,
     )
+
+
+def _span(found: Sequence[Statistics | None]) -> tuple[int, int] | None:
+    filled = [one for one in found if one is not None and one.message_count]
+    if not filled or None in found:
+        return None
+    return min(one.message_start_time for one in filled), max(one.message_end_time for one in filled)
 
 
 def _topics_of(part: Part) -> Iterator[tuple[TopicInfo, Records]]:

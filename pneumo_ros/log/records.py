@@ -66,6 +66,13 @@ class Gathered:
 
     heads: list[NDArray[np.void]] = field(default_factory=list)
     data: list[NDArray[np.uint8]] = field(default_factory=list)
+    size: int = 0  # bytes of messages
+
+    def add(self, heads: NDArray[np.void], data: NDArray[np.uint8]) -> None:
+        """The next messages."""
+        self.heads.append(heads)
+        self.data.append(data)
+        self.size += len(data)
 
     def records(self) -> Records:
         """One array per column, in log-time order; messages of equal time stay in file order."""
@@ -113,7 +120,9 @@ def join(parts: list[Records]) -> Records:
     return _sorted(joined) if np.any(np.diff(log) < 0) else joined
 
 
-def gather(block: Block, topics: Sequence[str] | None, into: dict[int, Gathered], contents: Contents) -> int:
+def gather(
+    block: Block, topics: Sequence[str] | None, into: dict[int, Gathered], contents: Contents, since_ns: int = 0
+) -> int:
     """Sort a block's messages into their channels; returns how many it holds, wanted or not.
 
     Parameters
@@ -122,6 +131,7 @@ def gather(block: Block, topics: Sequence[str] | None, into: dict[int, Gathered]
     topics : to keep, or None for all
     into : pieces by channel id, added to
     contents : receives the schemas and channels that stand inside the block
+    since_ns : log time before which nothing is kept
 
     Raises
     ------
@@ -138,10 +148,10 @@ def gather(block: Block, topics: Sequence[str] | None, into: dict[int, Gathered]
         if channel not in contents.channels:
             raise DamageError(f"messages of an undeclared channel {channel} in the chunk", contents.path, block.offset)
         if topics is None or contents.channels[channel].topic in topics:
-            mask = heads["channel"] == channel
-            pieces = into.setdefault(channel, Gathered())
-            pieces.heads.append(heads[mask])
-            pieces.data.append(_payloads(block.data, starts[mask], heads["length"][mask].astype(np.int64) - _FIXED))
+            mask = (heads["channel"] == channel) & (heads["log"] >= since_ns)
+            if mask.any():
+                lengths = heads["length"][mask].astype(np.int64) - _FIXED
+                into.setdefault(channel, Gathered()).add(heads[mask], _payloads(block.data, starts[mask], lengths))
     return len(starts)
 
 

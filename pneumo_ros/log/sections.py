@@ -13,7 +13,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, Header, Metadata, Schema, Statistics
 
-from pneumo_ros.log.bounds import MAX_CHANNELS, MAX_DECLARATION, MAX_RATIO, MAX_RECORDS, chunk_limit
+from pneumo_ros.log.bounds import MAX_CHANNELS, MAX_DECLARATION, MAX_RATIO, chunk_limit, most_records
 from pneumo_ros.log.container import Block, Contents, DamageError, Frame, frames, parse
 from pneumo_ros.log.unpacking import LARGER, decompress
 
@@ -50,14 +50,15 @@ def _listed(buffer: mmap.mmap | bytes, path: Path) -> tuple[list[Frame], list[tu
     """Records that must be looked at one by one, and the stretches of messages that stand outside of chunks."""
     kept: list[Frame] = []
     loose: list[tuple[int, int]] = []
+    most = most_records(len(buffer))
     for frame in frames(buffer, path):
         if frame.opcode == Opcode.MESSAGE:
             begin = loose.pop()[0] if loose and loose[-1][1] == frame.start else frame.start
             loose.append((begin, frame.end))
         elif frame.opcode < 0x80:
             kept.append(frame)
-        if len(kept) > MAX_RECORDS:
-            raise DamageError(f"more than {MAX_RECORDS} records", path, frame.start)
+        if len(kept) > most:
+            raise DamageError(f"more than {most} records", path, frame.start)
     return kept, loose
 
 

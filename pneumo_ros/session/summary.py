@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.log import topics
-from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.decoded import SECOND, Log
 from pneumo_ros.log.inspection import read_setups
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.topic_data import Joint
@@ -29,6 +29,8 @@ from pneumo_ros.rig.channels import (
 from pneumo_ros.units import GRAVITY
 
 SETTLED = 1.0  # s; figures of ride and estimate leave out the start before it
+LONGEST = 1800.0  # s of a session that are read for figures and picture, its last: 3 GB of memory
+SAMPLED = (topics.COMMAND, topics.ESTIMATE, topics.TRUTH, topics.ROAD, *topics.MEASUREMENTS)
 NEAR_LIMIT = 1e-9  # of the valve's range: a command this close to an end is saturated
 
 
@@ -45,6 +47,7 @@ class Recorded:
     road_time, road : (L,), (L, 2), m
     measured_time, measured : (J,), (J, 6) displacements, m, and pressures, Pa, in the order of their topics
     mode : lockstep, realtime, or empty where the log does not say
+    left_out : s of the session before the first sample here, where it is longer than what is read of one
     """
 
     rig: Rig
@@ -59,6 +62,7 @@ class Recorded:
     measured_time: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     measured: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 6)))
     mode: str = ""
+    left_out: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class Summary:
     mode : as in :class:`Recorded`
     judged_by : what the ride's figures come from: "truth" of a simulation, or "sensors"
     warnings : what a reader of the figures must know, one line each
+    stretch : of the session that ride, valves and estimates are judged in, for people
     """
 
     ride: Ride | None
@@ -85,19 +90,23 @@ class Summary:
     mode: str = ""
     judged_by: str = "truth"
     warnings: tuple[str, ...] = ()
+    stretch: str = "after the first second"
 
 
-def load_session(path: Path | str) -> Recorded:
-    """Read what summary and picture need.
+def load_session(path: Path | str, longest: float = LONGEST) -> Recorded:
+    """Read what summary and picture need, of a long session its last ``longest`` seconds.
 
     Raises
     ------
     InputError
         if the log cannot be read or holds no session of this rig.
     """
-    log = read_log(path)
-    if log.config is None:
+    told = read_log(path, [topics.CONFIG.name, topics.SETUP.name])
+    if told.config is None:
         raise InputError("no /rig/config in the log", where=path, remedy="record it, or give a log of this rig")
+    first, last = told.span_ns or (0, 0)
+    since = max(last - round(longest * SECOND), first)
+    log = read_log(path, [topic.name for topic in SAMPLED], since)
     begun = [int(log.joint(t.name).stamp_ns[0]) for t in (topics.COMMAND, topics.DISPLACEMENT) if _has(log, t)]
     if not begun:
         raise InputError(f"holds neither {topics.COMMAND.name} nor {topics.DISPLACEMENT.name}", where=path,
@@ -110,8 +119,10 @@ def load_session(path: Path | str) -> Recorded:
         joint: Joint = log.select(topic.name, list(topic.names))
         return np.asarray((joint.stamp_ns - start) * 1e-9, dtype=np.float64), joint.position
 
-    return Recorded(log.config, *columns(topics.COMMAND), *columns(topics.ESTIMATE), *columns(topics.TRUTH),
-                    *columns(topics.ROAD), *_measured(log, start), mode=_mode(log))  # fmt: skip
+    return Recorded(
+        told.config, *columns(topics.COMMAND), *columns(topics.ESTIMATE), *columns(topics.TRUTH), *columns(topics.ROAD),
+        *_measured(log, start), mode=_mode(told), left_out=(since - first) / SECOND,
+    )  # fmt: skip
 
 
 def _measured(log: Log, start: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -160,13 +171,21 @@ def summarise(
         session.mode,
         "truth" if by_truth else "sensors",
         tuple(warnings),
+        _stretch(session),
     )
+
+
+def _stretch(session: Recorded) -> str:
+    if not session.left_out:
+        return "after the first second"
+    length = _last(session) - session.left_out
+    return f"the last {length / 60.0:.0f} min of {_last(session) / 3600.0:.1f} h"
 
 
 def _last(session: Recorded) -> float:
     """Time of the last sample, s, with the period it stands for; NaN without any."""
     times = session.measured_time if len(session.measured_time) > 1 else session.time
-    return float(times[-1] + np.median(np.diff(times))) if len(times) > 1 else float("nan")
+    return float(session.left_out + times[-1] + np.median(np.diff(times))) if len(times) > 1 else float("nan")
 
 
 def area_error(session: Recorded) -> tuple[float, float] | None:
@@ -288,9 +307,8 @@ def _body_accelerations(session: Recorded, seen: NDArray[np.bool_]) -> tuple[NDA
     return (b * front + a * rear) / (a + b), (front - rear) / (a + b)
 
 
-def loop_timing(path: Path | str) -> dict[str, dict[str, str]]:
+def loop_timing(log: Log) -> dict[str, dict[str, str]]:
     """The last /diagnostics of each node: node -> key -> text."""
-    log = read_log(path, [topics.DIAGNOSTIC.name])
     out: dict[str, dict[str, str]] = {}
     if not _has(log, topics.DIAGNOSTIC):
         return out
@@ -301,9 +319,8 @@ def loop_timing(path: Path | str) -> dict[str, dict[str, str]]:
     return out
 
 
-def wall_time(path: Path | str) -> float:
+def wall_time(log: Log) -> float:
     """Seconds on the computer's clock between a session's first and last sample; NaN without both events."""
-    log = read_log(path, [topics.EVENTS.name])
     stamps: dict[str, float] = {}
     for _, message in log.messages(topics.EVENTS.name) if _has(log, topics.EVENTS) else ():
         stamp = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9

@@ -13,7 +13,7 @@ from helpers.small_logs import session, write
 
 from pneumo_ros.documents import parse_json, parse_yaml
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.bounds import chunks_up_to
+from pneumo_ros.log.bounds import chunks_up_to, free_for_messages
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.salvage import salvage
 
@@ -44,6 +44,15 @@ def test_a_larger_chunk_is_read_where_the_user_says_so(tmp_path: Path) -> None:
     with chunks_up_to(1), pytest.raises(InputError, match=r"more than 1 MiB.*pneumo --max-chunk MiB"):
         read_log(large)
     assert read_log(large).topics["/rig/displacement"].count == 6000
+
+
+def test_a_log_larger_than_memory_is_refused_before_it_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = write(tmp_path / "log.mcap", session(2000))
+    assert 1 << 30 < free_for_messages() < 1 << 50
+    monkeypatch.setattr("pneumo_ros.log.bags.free_for_messages", lambda: 100_000)
+    with pytest.raises(InputError, match="do not fit into memory.*half of what is free"):
+        read_log(log)
+    assert read_log(log, ["/rig/config"]).topics, "what is not kept needs no memory"
 
 
 def test_many_chunks_that_pack_too_well_are_refused_together(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.small_logs import STORE, write
+from helpers.small_logs import STORE, contract_log, write
 from rich.console import Console
 
 from pneumo_ros.cli.passive import passive_run
@@ -25,7 +25,7 @@ from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import build_road
 from pneumo_ros.session.picture import draw_session
-from pneumo_ros.session.summary import Recorded, change, figures, pace, summarise
+from pneumo_ros.session.summary import Recorded, change, figures, load_session, pace, summarise
 from pneumo_ros.session.warnings import warnings_of
 
 PERIOD = 2e-3
@@ -95,6 +95,19 @@ def test_full_scale_is_the_rig_files(simulated: Recorded) -> None:
     assert ours is not None and theirs is not None
     assert ours.full_scale_heave_rms == pytest.approx(0.8 * theirs.full_scale_heave_rms)
     assert "full scale (x 4)" in said(summary_table(summarise(small), None))
+
+
+def test_of_a_long_session_the_last_stretch_is_read_and_said(tmp_path: Path) -> None:
+    log = write(tmp_path / "long.mcap", contract_log(2000))
+    whole, late = load_session(log), load_session(log, longest=3.0)
+    assert not whole.left_out and late.left_out == pytest.approx(whole.time[-1] - 3.0, abs=0.01)
+    rows = len(late.time)
+    assert rows == pytest.approx(3.0 / PERIOD, abs=2)
+    for name in ("command", "measured", "road"):
+        np.testing.assert_array_equal(getattr(late, name), getattr(whole, name)[-rows:])
+    two_hours = dataclasses.replace(late, left_out=7200.0 - 3.0)
+    assert "The last 0 min of 2.0 h" in said(summary_table(summarise(two_hours), None))
+    assert summarise(two_hours, wall=7200.0).speed == pytest.approx(1.0, abs=1e-3)
 
 
 def test_a_rating_that_left_its_scale_is_no_zero(simulated: Recorded) -> None:

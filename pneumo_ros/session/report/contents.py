@@ -54,8 +54,8 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         and len(session.road) > 1
     ):
         passive = passive_session(session)
-    loop = loop_timing(log.path)
-    ours = summarise(session, loop, wall_time(log.path), warnings_of(log, loop, session.mode))
+    loop = loop_timing(log)
+    ours = summarise(session, loop, wall_time(log), warnings_of(log, loop, session.mode))
     theirs = summarise(passive) if passive is not None else None
     findings = check_conformance(log)
     return {
@@ -67,6 +67,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "has_passive": theirs is not None,
         "picture": _picture(session, passive, log.path.name),
         "pace": pace(ours),
+        "stretch": ours.stretch,
         "judged_by": ours.judged_by,
         "warnings": ours.warnings,
         "waits": ours.mode == "lockstep",
