@@ -50,7 +50,7 @@ def test_a_log_larger_than_memory_is_refused_before_it_is_full(tmp_path: Path, m
     log = write(tmp_path / "log.mcap", session(2000))
     assert 1 << 30 < free_for_messages() < 1 << 50
     monkeypatch.setattr("pneumo_ros.log.bags.free_for_messages", lambda: 100_000)
-    with pytest.raises(InputError, match="do not fit into memory.*half of what is free"):
+    with pytest.raises(InputError, match=r"do not fit into memory.*half of what is free"):
         read_log(log)
     assert read_log(log, ["/rig/config"]).topics, "what is not kept needs no memory"
 
