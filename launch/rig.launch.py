@@ -25,7 +25,7 @@ from pneumo_ros.control.presets import PRESETS, controller_settings
 from pneumo_ros.nodes.neighbours import claim_place
 from pneumo_ros.paths import share_file
 from pneumo_ros.session.claim import Claim
-from pneumo_ros.session.middleware import DISCOVERY_RANGE, middleware_settings
+from pneumo_ros.session.middleware import middleware_settings
 from pneumo_ros.session.supervisor import END_REASON, SUPERVISOR
 
 SOURCES = {"sim": "plant", "serial": "daq"}
@@ -78,7 +78,7 @@ def nodes(context: LaunchContext) -> list[object]:
     config = given["params_file"] or str(share_file("config", "session.yaml"))
     reason = Path(tempfile.mkdtemp(prefix="pneumo-")) / "end_reason"
     # Where nodes may be found is the launching user's to say, as of every launch file.
-    settings = {name: value for name, value in middleware_settings(os.environ).items() if name != DISCOVERY_RANGE}
+    settings = middleware_settings(os.environ, discovery="SUBNET")
     made = {
         name: Node(
             package="pneumo_ros", executable=name, name=name, namespace=namespace, output="screen",

@@ -9,14 +9,19 @@ from pneumo_ros.paths import share_file
 
 DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 FAST_DDS_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"  # of Fast DDS 2; any other middleware leaves it unread
+HERE = ("LOCALHOST", "OFF")  # ranges whose nodes need no network
 
 
-def middleware_settings(environment: Mapping[str, str]) -> dict[str, str]:
+def middleware_settings(environment: Mapping[str, str], discovery: str = "LOCALHOST") -> dict[str, str]:
     """Environment variables to add: a session stays on this computer, and its writers repair within 0.1 s.
 
     Parameters
     ----------
     environment : what the user has set; that stays
+    discovery : how far nodes look for one another where the user has not said; only what stays here closes its
+        sockets to the network
     """
-    settings = {DISCOVERY_RANGE: "LOCALHOST", FAST_DDS_PROFILES: str(share_file("config", "fastdds.xml"))}
+    found = environment.get(DISCOVERY_RANGE, discovery)
+    profiles = "fastdds_loopback.xml" if found in HERE else "fastdds.xml"
+    settings = {DISCOVERY_RANGE: discovery, FAST_DDS_PROFILES: str(share_file("config", profiles))}
     return {name: value for name, value in settings.items() if name not in environment}

@@ -67,4 +67,37 @@ def test_a_subscriber_that_was_held_up_gets_the_last_message_once_it_goes_on() -
 def test_what_the_user_told_the_middleware_stays() -> None:
     own = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", FAST_DDS_PROFILES: "/mine.xml"}
     assert middleware_settings(own) == {}
-    assert Path(middleware_settings({})[FAST_DDS_PROFILES]).is_file()
+    for discovery in ("LOCALHOST", "SUBNET"):
+        assert Path(middleware_settings({}, discovery)[FAST_DDS_PROFILES]).is_file()
+
+
+LISTENS = """
+import glob, os
+import rclpy
+from rclpy.node import Node
+rclpy.init()
+node = Node("listens")
+own = {os.readlink(entry) for entry in glob.glob("/proc/self/fd/*") if os.path.islink(entry)}
+rows = [line.split() for line in open("/proc/net/udp").read().splitlines()[1:]]
+print(" ".join(row[1] for row in rows if f"socket:[{row[9]}]" in own))
+"""
+LOOPBACK = "0100007F"
+
+
+def heard_by(discovery: str) -> tuple[set[str], int]:
+    """Addresses, in hexadecimal, at which a node takes messages of its domain, and how many sockets that are."""
+    domain = sessions.own_domain()
+    environment = {**sessions.environment(), "ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": discovery}
+    done = subprocess.run([sys.executable, "-c", LISTENS], env=environment | middleware_settings(environment),
+                          capture_output=True, text=True, timeout=60, check=True)  # fmt: skip
+    ports = range(7400 + 250 * domain, 7650 + 250 * domain)  # of a domain, by the RTPS specification
+    found = [place.split(":") for place in done.stdout.split()]
+    heard = [address for address, port in found if int(port, 16) in ports]
+    return set(heard), len(heard)
+
+
+def test_a_session_that_stays_on_this_computer_takes_nothing_from_the_network() -> None:
+    """With a range of LOCALHOST alone a node's sockets are as open as with SUBNET."""
+    addresses, count = heard_by("LOCALHOST")
+    assert addresses == {LOOPBACK} and count >= 2
+    assert "00000000" in heard_by("SUBNET")[0], "who wants the network has it"

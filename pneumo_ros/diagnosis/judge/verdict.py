@@ -193,9 +193,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                c.slight / max(closed, 1e-9),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
-    if one.places[0].startswith(
-        SENSOR
-    ):  # what moves the rig looks like a sensor's error as well: no less than it is left
+    # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it.
+    if one.places[0].startswith(SENSOR):
         against.append(one.own / max(one.without - one.own, 1e-12))
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
