@@ -12,8 +12,18 @@ from pneumo_ros.diagnosis.fit.problem import Candidate
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group, as_good
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
-from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, told_probability
-from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, select
+from pneumo_ros.diagnosis.judge.verdict import (
+    Calibration,
+    HeldOutGaps,
+    Opinion,
+    beyond,
+    credit,
+    judge,
+    structures,
+    told_probability,
+    unexplained,
+)
+from pneumo_ros.diagnosis.search.selection import SHARPNESS, Scored, Thresholds, log_weight, select
 
 CALM = HeldOutGaps(1.2, 1.1)
 LIMITS = Thresholds()
@@ -252,3 +262,102 @@ def test_what_the_held_out_log_keeps_within_the_form_is_nothings(form: float, ve
     """One kept block of the fitted log leaves more, the held-out log less than the form is worth."""
     refit = scored(400.0, 3.0)
     assert judge(refit, [], refit, Calibration(), HeldOutGaps(0.7, 0.7, form)).verdict == verdict
+
+
+CONSTANTS = Calibration()
+SURE = EffectEvidence(("leak", "front"), ("front_air",), 1.0, 0.0, 0.0, share=1e3, beside=1e3)
+FAR = HeldOutGaps(1e6, 1.0)
+
+
+def beyond_one(left: float) -> float:
+    """The gap that holds so much beside a floor of one."""
+    return float(np.hypot(left, 1.0))
+
+
+def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
+    """Each thing that speaks against a name, alone and ``k`` times as large as what makes it as likely as not."""
+    c = CONSTANTS
+    half_left = HeldOutGaps(1e6, 1e6 * k * c.bent)
+    return {
+        "closes too little": (replace(SURE, own=(k * (1.0 - c.closes)) ** 2), FAR),
+        "leaves too much": (replace(SURE, leaves=1.0 + k * (c.leaves - 1.0)), FAR),
+        "stands at bounds": (replace(SURE, at_bounds=k * c.at_bounds), FAR),
+        "bends its shape": (replace(SURE, bent=c.at_bounds), half_left),
+        "holds next to nothing": (replace(SURE, share=c.least / k), FAR),
+        "the structure closes little": (SURE, HeldOutGaps(1e6, 1e6 * (1.0 - c.slight / k))),
+        "nobody misses it": (replace(SURE, beside=c.beside / k, instead=1.0), FAR),
+        "another does its work": (replace(SURE, beside=1e-6, instead=1.0 + (c.instead - 1.0) / k), FAR),
+        "traces": (SURE, HeldOutGaps(beyond_one(c.traces / k), 1.0)),
+        "a sensor's, beside what is left": (
+            replace(SURE, places=("sensor:sprung_front",), own=k / (1.0 + k), ceiling=k / (1.0 + k)),
+            FAR,
+        ),
+    }
+
+
+@pytest.mark.parametrize("reason", list(reasons(1.0)))
+def test_each_reason_against_a_name_alone(reason: str) -> None:
+    """One half where it is as large as its constant; the fourth power of how much larger or smaller elsewhere."""
+    assert credit(SURE, FAR, CONSTANTS) > 0.999
+    for k in (0.5, 0.8, 1.0):
+        one, held = reasons(k)[reason]
+        assert credit(one, held, CONSTANTS) == pytest.approx(1.0 / (1.0 + k**CONSTANTS.steepness), abs=2e-4)
+
+
+def test_what_no_name_explains_is_unknown_from_its_constants_on() -> None:
+    c = CONSTANTS
+    assert unexplained(c.real, HeldOutGaps(1.0, 1.0), c) == pytest.approx(0.5)
+    assert unexplained(2.0 * c.real, HeldOutGaps(0.3, 1.0), c) == pytest.approx(0.8)
+    assert unexplained(0.0, HeldOutGaps(c.held_real, 1.0), c) == pytest.approx(0.5) and c.held_real == 3.0
+    assert unexplained(0.0, HeldOutGaps(beyond_one(2.0 * np.sqrt(8.0)), 1.0), c) == pytest.approx(16.0 / 17.0)
+    assert unexplained(c.real, HeldOutGaps(c.held_real, 1.0), c) == pytest.approx(2.0 / 3.0)
+    assert beyond(5.0, 3.0) == 4.0 and beyond(1.0, 1.0) == beyond(0.5, 1.0) == 0.0
+
+
+def test_probabilities_of_structures_are_weights_that_sum_to_one() -> None:
+    """By hand, of the training costs: whether anything acts, then how many effects, then which of as many."""
+    c = CONSTANTS
+    refit = scored(50.0, 1000.0)
+    leak, lag = scored(1.0, 400.0, "leak", unknowns=32), scored(1.1, 404.0, "valve_lag", unknowns=33)
+    both = scored(1.0, 395.0, "leak", "valve_lag", unknowns=35)
+    found = structures(refit, [refit, leak, lag, both], leak, c)
+    assert sum(found.values()) == pytest.approx(1.0)
+
+    def weight(one: Scored, pays: float) -> float:
+        return -SHARPNESS * one.price / one.samples - pays
+
+    of_two = weight(both, c.first_penalty + c.second_penalty) - weight(leak, c.first_penalty)
+    assert found[both.fit.candidate] / found[leak.fit.candidate] == pytest.approx(float(np.exp(of_two)))
+    of_other = log_weight(lag, refit) - log_weight(leak, refit)
+    assert found[lag.fit.candidate] / found[leak.fit.candidate] == pytest.approx(float(np.exp(of_other)))
+    against = weight(leak, c.first_penalty) - weight(refit, 0.0)
+    assert found[refit.fit.candidate] == pytest.approx(1.0 / (1.0 + float(np.exp(against))))
+    assert structures(refit, [refit], refit, c) == {refit.fit.candidate: 1.0}
+
+
+def test_places_of_one_family_share_its_probability_by_their_prices() -> None:
+    refit = scored(50.0, 1000.0)
+    front, rear = scored(1.0, 400.0, "leak", unknowns=32), scored(1.0, 460.0, "leak", unknowns=32, site="rear")
+    lag = scored(1.3, 430.0, "valve_lag", unknowns=32)
+    found = structures(refit, [front, rear, lag], front, CONSTANTS)
+    ratio = found[rear.fit.candidate] / found[front.fit.candidate]
+    assert ratio == pytest.approx(float(np.exp(-SHARPNESS * 60.0 / 600.0))) and 0.0 < ratio < 1.0
+    alone = structures(refit, [front, lag], front, CONSTANTS)[front.fit.candidate]
+    assert found[front.fit.candidate] < alone, "the other place takes its part of the family's"
+
+
+@pytest.mark.parametrize("something", [True, False])
+def test_what_was_selected_is_as_likely_as_its_opposite_at_least(something: bool) -> None:
+    refit, leak = scored(1.0, 400.0), scored(1.0, 400.0 if something else 100.0, "leak", unknowns=32)
+    found = structures(refit, [leak], leak if something else refit, CONSTANTS)
+    assert found == {refit.fit.candidate: 0.5, leak.fit.candidate: 0.5}
+
+
+def test_nothing_and_unknown_share_what_no_structure_takes() -> None:
+    refit = scored(2.0, 400.0)
+    told = judge(refit, [], refit, CONSTANTS, HeldOutGaps(2.0, 2.0))
+    assert told.verdict == "unknown" and told.of("none") == pytest.approx(1.0 - told.unknown)
+    assert 0.5 < told.unknown < 0.9
+    leak = scored(0.2, -900.0, "leak", unknowns=32)
+    without_evidence = judge(refit, [leak], leak, CONSTANTS, HeldOutGaps(20.0, 1.0), [])
+    assert without_evidence.verdict == "unknown" and without_evidence.of("leak") == 0.0
