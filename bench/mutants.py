@@ -4,7 +4,8 @@
     make mutants MODULE=units      # one of MODULES below
 
 Every mutant is one operator, number, comparison or decorator changed in a copy of the sources under build/mutants; the
-tests of the module run against it. Who survives is printed with its change. docs/mutants.md keeps the results.
+tests of the module run against it, from a warm process (warm_tests.py). Who survives is printed with its change.
+docs/mutants.md keeps the results.
 """
 
 from __future__ import annotations
@@ -14,10 +15,15 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TREE = ROOT / "build" / "mutants"
+WARM = ROOT / "bench" / "warm_tests.py"
 TIMEOUT = 120.0  # s for the tests of one mutant; one that runs longer counts as killed
 # Name -> (source file, tests that answer for it).
 MODULES = {
@@ -41,31 +47,55 @@ def copied() -> None:
             shutil.copy2(ROOT / name, TREE / name)
 
 
-def configured(source: str, tests: str) -> None:
-    """cosmic-ray's configuration; the first failing test ends a mutant."""
-    command = f"{sys.executable} -m pytest -x -q -p no:cacheprovider {tests}"
+def configured(source: str, place: Path) -> None:
+    """cosmic-ray's configuration: one question to the warm process that listens at ``place`` for each mutant."""
+    command = f"{sys.executable} -S {WARM} ask {place}"
     (TREE / "mutants.toml").write_text(
         f'[cosmic-ray]\nmodule-path = "{source}"\ntimeout = {TIMEOUT}\nexcluded-modules = []\n'
         f'test-command = "{command}"\n\n[cosmic-ray.distributor]\nname = "local"\n'
     )
 
 
+def environment() -> dict[str, str]:
+    """The copy before the installed package, compiled code beside it."""
+    return {**os.environ, "PYTHONPATH": str(TREE), "NUMBA_CACHE_DIR": str(TREE / "numba")}
+
+
 def cosmic_ray(*arguments: str) -> str:
     """Run its command line in the copy."""
-    place = {**os.environ, "PYTHONPATH": str(TREE), "NUMBA_CACHE_DIR": str(TREE / "numba")}
     command = [str(Path(sys.executable).parent / "cosmic-ray"), *arguments]
-    return subprocess.run(command, cwd=TREE, env=place, check=True, capture_output=True, text=True).stdout
+    return subprocess.run(command, cwd=TREE, env=environment(), check=True, capture_output=True, text=True).stdout
+
+
+@contextmanager
+def warm(tests: str, place: Path) -> Iterator[None]:
+    """A process that has the libraries and runs the tests when asked; the first failing one ends a run."""
+    command = [sys.executable, str(WARM), "serve", str(place), "-x", "-q", "-p", "no:cacheprovider", tests]
+    process = subprocess.Popen(command, cwd=TREE, env=environment())
+    try:
+        while not place.exists():
+            if process.poll() is not None:
+                raise SystemExit("the warm process has ended")
+            time.sleep(0.1)
+        yield
+    finally:
+        process.kill()
+        process.wait()
 
 
 def main() -> None:
     """Print how many mutants there were, and those that survived."""
     if len(sys.argv) != 2 or sys.argv[1] not in MODULES:
         raise SystemExit(f"give one of {', '.join(MODULES)}")
+    source, tests = MODULES[sys.argv[1]]
     copied()
-    configured(*MODULES[sys.argv[1]])
-    cosmic_ray("init", "mutants.toml", "session.sqlite")
-    cosmic_ray("baseline", "mutants.toml")
-    cosmic_ray("exec", "mutants.toml", "session.sqlite")
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / "warm"
+        configured(source, place)
+        cosmic_ray("init", "mutants.toml", "session.sqlite")
+        with warm(tests, place):
+            cosmic_ray("baseline", "mutants.toml")
+            cosmic_ray("exec", "mutants.toml", "session.sqlite")
     rows = [json.loads(line) for line in cosmic_ray("dump", "session.sqlite").splitlines()]
     done = [(item, result) for item, result in rows if result is not None]
     survivors = [(item, result) for item, result in done if result["test_outcome"] == "survived"]
