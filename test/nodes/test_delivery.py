@@ -69,6 +69,8 @@ def test_what_the_user_told_the_middleware_stays() -> None:
     assert middleware_settings(own) == {}
     for discovery in ("LOCALHOST", "SUBNET"):
         assert Path(middleware_settings({}, discovery)[FAST_DDS_PROFILES]).is_file()
+    peers = middleware_settings({"ROS_STATIC_PEERS": "192.0.2.7"})
+    assert peers == middleware_settings({}, "SUBNET") | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 LISTENS = """
