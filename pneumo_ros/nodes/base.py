@@ -56,7 +56,7 @@ COMMON: tuple[Parameter, ...] = (
         read_only=True,
     ),
     Parameter(
-        "executor", "events", "", "events: EventsExecutor through spin_once; single: SingleThreadedExecutor",
+        "executor", "events", "", "events: EventsExecutor; single: SingleThreadedExecutor",
         choices=("events", "single"), read_only=True,
     ),
     Parameter(

@@ -17,13 +17,15 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 
 from pneumo_ros.daq.priority import freeze_startup_objects
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.nodes.base import FAILED, RigNode, StopRequest, say
 from pneumo_ros.session.supervisor import SUPERVISOR
 
-SPIN_TIMEOUT = 0.05  # s; EventsExecutor.spin() never returns to Python in the PyPI wheels, spin_once does
+SPIN_TIMEOUT = 0.05  # s; EventsExecutor without one holds the interpreter in the PyPI wheels: no timer ticks
+LOOK_PERIOD = 0.01  # s between looks whether a stop was asked for
 TICK_TIMEOUT = 2.0  # s within which a timer must tick on a working executor
 BAD_INPUT = 2
 ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -104,15 +106,33 @@ def spin(nodes: Sequence[RigNode], stop: StopRequest, context: Context | None = 
         node.stop = stop
     executor = working_executor(nodes, context)
     freeze_startup_objects()
-    spin_once = executor.spin_once
-    while not stop.set:
-        spin_once(SPIN_TIMEOUT)
+    _spin_until(stop, nodes[0], executor)
     for node in nodes:
         node.on_stop(executor)
     code = max(node.exit_code for node in nodes)
     if stop.failed and not code:  # ended from outside
         say(f"error: {stop.reason}", sys.stderr)
     return code or (FAILED if stop.failed else 0)
+
+
+def _spin_until(stop: StopRequest, node: RigNode, executor: Executor) -> None:
+    """Run callbacks until a stop is asked for.
+
+    All events in one call of the executor: returning to Python after each takes a fifth of a lockstep period. The call
+    may go on as long as events come, so a timer looks for the stop; a handler of signals may not complete a future,
+    whose lock the interrupted code may hold. The future is new each time because the executor leaves a callback in it.
+    """
+    asked: Future = Future()
+
+    def look() -> None:
+        if stop.set and not asked.done():
+            asked.set_result(None)
+
+    timer = node.steady_timer(LOOK_PERIOD, look)
+    while not stop.set:
+        asked = Future()
+        executor.spin_until_future_complete(asked, SPIN_TIMEOUT)
+    node.destroy_timer(timer)
 
 
 def node_main(build: Callable[[], RigNode], args: list[str] | None = None) -> int:
