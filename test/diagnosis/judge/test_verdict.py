@@ -361,3 +361,13 @@ def test_nothing_and_unknown_share_what_no_structure_takes() -> None:
     leak = scored(0.2, -900.0, "leak", unknowns=32)
     without_evidence = judge(refit, [leak], leak, CONSTANTS, HeldOutGaps(20.0, 1.0), [])
     assert without_evidence.verdict == "unknown" and without_evidence.of("leak") == 0.0
+
+
+def test_an_effect_that_is_taken_back_is_told_as_often_as_something_acts() -> None:
+    refit, leak = scored(2.0, 400.0), scored(0.2, -900.0, "leak", unknowns=32)
+    held = HeldOutGaps(2.5, 1.0)
+    unknown = unexplained(refit.level, held, CONSTANTS)
+    told = judge(refit, [leak], leak, CONSTANTS, held, evidence(leak, 1.0, 0.1, 0.1, at_bounds=1e6))
+    assert 0.5 < unknown < 0.9 and told.unknown == pytest.approx(unknown)
+    assert told.of("none") == pytest.approx(1.0 - unknown)
+    assert told.effects["leak", "front"] == pytest.approx(CONSTANTS.taken_back * unknown)
