@@ -17,14 +17,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointEncoder, PressureEncoder, encode_clock
 from pneumo_ros.log.topics import Topic
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, subscriber_qos
+from pneumo_ros.nodes.spin import LOOK_PERIOD, SPIN_TIMEOUT
+from pneumo_ros.session.middleware import middleware_settings
 
 # Node -> what it waits for every period, and what it then says.
 GRAPH: dict[str, tuple[tuple[Topic, ...], tuple[Topic, ...]]] = {
@@ -37,6 +41,7 @@ RECORDED = (topics.ROAD, *topics.MEASUREMENTS, topics.ESTIMATE, topics.COMMAND, 
 SOME = 5  # clock, truth and sliding variables go out every so many periods, and a clock asks for as many road samples
 SELDOM = (topics.CLOCK, topics.TRUTH, topics.SLIDING)
 HOPS = sum(1.0 / SOME if t in SELDOM else 1.0 for t in (*RECORDED, *(t for takes, _ in GRAPH.values() for t in takes)))
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 START = 1.0  # s for all nodes to find one another
 ROLES = (*GRAPH, "recorder")
 
@@ -94,8 +99,19 @@ def spin(roles: Sequence[str], seconds: float) -> float:
         executor.add_node(one.node)
 
     def until(end: float, done: Callable[[], bool] = lambda: False) -> None:
+        """All events in few calls of the executor, as the nodes of a session do it (pneumo_ros/nodes/spin.py)."""
+        asked = Future()
+
+        def look() -> None:
+            if (time.monotonic() >= end or done()) and not asked.done():
+                asked.set_result(None)
+
+        node = next(iter(nodes.values())).node
+        timer = node.create_timer(LOOK_PERIOD, look, clock=STEADY)
         while time.monotonic() < end and not done():
-            executor.spin_once(0.05)
+            asked = Future()
+            executor.spin_until_future_complete(asked, SPIN_TIMEOUT)
+        node.destroy_timer(timer)
 
     until(time.monotonic() + START)
     if "plant" not in nodes:
@@ -112,7 +128,7 @@ def spin(roles: Sequence[str], seconds: float) -> float:
 def ring(domain: int, seconds: float, single: bool) -> float:
     """Periods a second, in one process or in five."""
     groups = [",".join(ROLES)] if single else list(ROLES)
-    place = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+    place = {**os.environ, **middleware_settings(os.environ), "ROS_DOMAIN_ID": str(domain)}
     started = [
         subprocess.Popen(
             [sys.executable, __file__, "--roles", group, "--seconds", str(seconds)], env=place, text=True,
