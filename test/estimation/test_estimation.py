@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 
 from pneumo_ros.errors import InputError
 from pneumo_ros.estimation.differentiator import Differentiator, scaled_gains
-from pneumo_ros.estimation.least_squares import BOUNDED, EXPONENTIAL, GRADIENT, LEAST_SQUARES, norm, update
+from pneumo_ros.estimation.least_squares import (
+    BOUNDED,
+    EXPONENTIAL,
+    GRADIENT,
+    LEAST_SQUARES,
+    forgetting_factor,
+    initial_gain,
+    norm,
+    update,
+)
 
 PERIOD = 0.002
 
@@ -121,3 +130,31 @@ def test_no_gain_makes_the_parameter_error_grow(method: int, forgetting: float, 
         assert np.isfinite(error) and error <= last * (1.0 + 1e-6) + 1e-6 * 10.0**size
         assert P[0, 0] > 0.0 and P[0, 0] * P[1, 1] - P[0, 1] ** 2 > -1e-9 * P[0, 0] * P[1, 1]
         last = error
+
+
+@pytest.mark.parametrize("P", [[[3.0, 1.2], [1.2, 0.7]], [[0.5, -0.4], [-0.4, 4.0]], [[2.0, 0.0], [0.0, 2.0]], [[1.7]]])
+def test_the_norm_of_a_gain_is_its_largest_eigenvalue(P: list[list[float]]) -> None:
+    gain = np.array(P)
+    largest = float(np.linalg.eigvalsh(gain)[-1])
+    assert norm(gain) == pytest.approx(largest, rel=1e-14)
+    assert forgetting_factor(BOUNDED, gain, 3.0, 5.0) == pytest.approx(3.0 * (1.0 - largest / 5.0))
+    assert forgetting_factor(BOUNDED, gain, 3.0, 0.5 * largest) == 0.0, "a gain beyond the bound is not made larger"
+    assert forgetting_factor(EXPONENTIAL, gain, 3.0, 5.0) == 3.0
+    assert forgetting_factor(LEAST_SQUARES, gain, 3.0, 5.0) == forgetting_factor(GRADIENT, gain, 3.0, 5.0) == 0.0
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_one_step_is_that_of_numpys_inverses(size: int) -> None:
+    """The discrete form by matrices: the information fades and grows by the regressor; the parameters move by the new gain."""
+    rng = np.random.default_rng(size)
+    W, residual, a = rng.normal(size=(2, size)), rng.normal(size=2), rng.normal(size=size)
+    root = rng.normal(size=(size, size))
+    P = initial_gain(size, 2.0) + root @ root.T
+    period, forgetting = 0.01, 4.0
+    new, gain = update(EXPONENTIAL, a, P, W, residual, forgetting, 1e9, period)
+    fade = np.exp(-forgetting * period)
+    weight = (1.0 - fade) / forgetting
+    expected = np.linalg.inv(fade * np.linalg.inv(P) + weight * W.T @ W)
+    np.testing.assert_allclose(gain, expected, rtol=1e-12)
+    np.testing.assert_allclose(new, a + weight * expected @ W.T @ residual, rtol=1e-12)
+    np.testing.assert_array_equal(initial_gain(size, 2.0), 2.0 * np.eye(size))
