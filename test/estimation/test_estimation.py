@@ -145,7 +145,7 @@ def test_the_norm_of_a_gain_is_its_largest_eigenvalue(P: list[list[float]]) -> N
 
 @pytest.mark.parametrize("size", [1, 2])
 def test_one_step_is_that_of_numpys_inverses(size: int) -> None:
-    """The discrete form by matrices: the information fades and grows by the regressor; the parameters move by the new gain."""
+    """The discrete form by matrices: information fades and grows by the regressor; the gain moves the parameters."""
     rng = np.random.default_rng(size)
     W, residual, a = rng.normal(size=(2, size)), rng.normal(size=2), rng.normal(size=size)
     root = rng.normal(size=(size, size))
