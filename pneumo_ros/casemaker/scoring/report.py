@@ -257,11 +257,16 @@ def _plot(path: Path, cases: Sequence[Case]) -> None:
     bins = reliability(cases)
     left.plot([0, 1], [0, 1], color="0.7")
     left.scatter([b.stated for b in bins], [b.right for b in bins], s=[12 + 3 * b.count for b in bins])
-    left.set(xlabel="stated probability", ylabel="share right", title=f"ECE {expected_error(cases):.3f}")
+    left.set(
+        xlabel="stated probability", ylabel="share right", title=f"the whole verdict: ECE {expected_error(cases):.3f}"
+    )
     coverage, risk = risk_coverage(cases)
     right.plot(coverage, risk)
     right.set(
-        xlabel="share of cases answered", ylabel="share wrong among them", title="risk against coverage", ylim=(0, None)
+        xlabel="share of cases answered",
+        ylabel="share wrong among them",
+        title="the whole verdict: risk against coverage",
+        ylim=(0, None),
     )
     figure.tight_layout()
     figure.savefig(path, dpi=120)
