@@ -30,7 +30,8 @@ SETTLED: Final = 1.0  # s at the start that say nothing: the first state was rea
 LEADS: Final = (0.1, 0.15, 0.2, 0.3, 0.5)  # s that stamps may be off by; an effect may be late by less [taste]
 LONGEST: Final = 0.2  # share of the log that stamps may be off by [numerics]
 DOUBT: Final = 0.5  # most probability of a verdict beside a clock or a zero that may be wrong [taste]
-TOPICS: Final = {  # the channels that each topic carries [definition]
+# Channels that each topic carries [definition]
+TOPICS: Final = {
     "/rig/displacement": DISPLACEMENTS, "/rig/front/pressure": PRESSURES[:1], "/rig/rear/pressure": PRESSURES[1:],
 }  # fmt: skip
 
