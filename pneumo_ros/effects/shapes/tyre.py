@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Atoms of a force between axle and ground, positive up on the axle: losses, lost contact, another stiffness.
 
-A contact that only pushes has a force that is convex over the compression: ramps at its end, and a progressive part
-that agrees with the linear tyre without load and at rest. All are in proportion to the compression at rest, so that
-both ends may share them.
+A contact that only pushes has a force that is convex over the compression: ramps below several compressions, and a
+progressive part that agrees with the linear tyre without load and at rest. A carcass that lets go smoothly touches
+early and is softer about its rest than the line through both: a ramp that begins beyond the rest, and is nothing at it,
+so that the rig's trim stays. All are in proportion to the compression at rest, so that both ends may share them.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -19,7 +20,8 @@ from pneumo_ros.effects.shapes.atoms import Atom, Term
 
 RATES = (0.03, 0.15)  # m/s
 SLACKS = (3e-4, 1.5e-3)  # m
-LIFTS = (0.0, 0.05, 0.15, 0.35, 0.7)  # shares of the compression at rest below which force is taken away
+# Shares of the compression at rest below which force is taken away
+LIFTS = (0.0, 0.05, 0.15, 0.35, 0.7, 1.0, 1.4)
 
 ATOMS = (
     Atom("loss", "N s/m", 20.0),
@@ -49,7 +51,8 @@ def tyre(tyre: Tyre, z: State, p: Values) -> float:
     out += p[3] * v * max(0.0, c) / 0.02 + p[4] * z[0] + p[5] * z[1]
     out += p[6] * max(0.0, -c) + p[7] * max(0.0, 0.05 * rest - c) + p[8] * max(0.0, 0.15 * rest - c)
     out += p[9] * max(0.0, 0.35 * rest - c) + p[10] * max(0.0, 0.7 * rest - c)
-    return out + p[11] * c * (c / rest - 1.0) + p[12] * rest
+    out += p[11] * max(0.0, rest - c) + p[12] * (max(0.0, 1.4 * rest - c) - 0.4 * rest)
+    return out + p[13] * c * (c / rest - 1.0) + p[14] * rest
 
 
 TYRE = Term("tyre", PlantTerm(states=2, advance=advance, tyre=tyre), ATOMS, ENDS, ("{end}_tyre",))
@@ -59,7 +62,7 @@ EFFECTS = (
         "tyre_liftoff",
         ["lift", "progressive", "constant"],
         "a tyre that stops pulling, of any law: its force is convex over the compression",
-        alone=("lift below 5 %", "lift below 35 %", "progressive"),
+        alone=("lift below 5 %", "lift below 35 %", "lift below 140 %", "progressive"),
     ),
     TYRE.anything(),
 )
