@@ -42,7 +42,7 @@ def copied() -> None:
     shutil.rmtree(TREE, ignore_errors=True)
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout
     for name in filter(None, listed.decode().split("\0")):
-        if (ROOT / name).is_file() and not name.startswith("docs/"):
+        if (ROOT / name).is_file():
             (TREE / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, TREE / name)
 
@@ -94,7 +94,10 @@ def main() -> None:
         configured(source, place)
         cosmic_ray("init", "mutants.toml", "session.sqlite")
         with warm(tests, place):
-            cosmic_ray("baseline", "mutants.toml")
+            try:
+                cosmic_ray("baseline", "mutants.toml")
+            except subprocess.CalledProcessError as error:
+                raise SystemExit(f"{tests} fails in the copy before any change: run it in {TREE}") from error
             cosmic_ray("exec", "mutants.toml", "session.sqlite")
     rows = [json.loads(line) for line in cosmic_ray("dump", "session.sqlite").splitlines()]
     done = [(item, result) for item, result in rows if result is not None]
