@@ -7,7 +7,7 @@ import mmap
 import struct
 import zlib
 from collections.abc import Iterable, Iterator
-from itertools import islice, takewhile
+from itertools import takewhile
 from pathlib import Path
 
 from mcap.opcode import Opcode
@@ -35,7 +35,8 @@ def read_blocks(buffer: mmap.mmap | bytes, path: Path, contents: Contents) -> It
     for i, frame in enumerate(data):
         if frame.opcode == Opcode.CHUNK:
             chunks += 1
-            index = takewhile(lambda f: f.opcode == Opcode.MESSAGE_INDEX, islice(data, i + 1, None))
+            following = (data[k] for k in range(i + 1, len(data)))
+            index = takewhile(lambda f: f.opcode == Opcode.MESSAGE_INDEX, following)
             block = chunk_block(buffer, frame, index, contents)
             content = check_ratio(content + len(block.data), buffer, path, frame.start)
             yield block
