@@ -21,7 +21,7 @@ from pneumo_ros.estimation.least_squares import METHODS, initial_gain
 from pneumo_ros.parameters import Value
 from pneumo_ros.plant.air_spring import MEAN_AREA, effective_area, load_surface
 from pneumo_ros.rig import load_rig
-from pneumo_ros.rig.channels import CHANNELS, ESTIMATE_FIELDS
+from pneumo_ros.rig.channels import ESTIMATE_FIELDS
 from pneumo_ros.units import GRAVITY
 
 PERIOD = 2e-3  # s
@@ -56,7 +56,7 @@ def balanced() -> np.ndarray:
 @pytest.mark.parametrize("first", [0, 2])
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_four_points_of_a_rigid_body_and_two_axles(order: int, first: int) -> None:
-    """Front point up by a tau, rear one down by b tau (Eqs. 4.60); each height is its point above its axle."""
+    """Front point up by a tau, rear one down by b tau; each height is its point above its axle."""
     heave, pitch, axles = 0.7, -0.3, (0.2, 0.05)
     d = np.full((4, first + 4), np.nan)
     d[:, first + order] = [heave + RIG.front_arm.value * pitch, heave - RIG.rear_arm.value * pitch, *axles]
@@ -79,8 +79,8 @@ def test_the_regressor_is_the_residuals_slope(known: bool) -> None:
         moved = at + step * (np.arange(2) == k)
         other, _ = believed_areas(x, moved, model, SURFACE)
         _, there = regression(x, other, slopes, model)
-        # The surface is measured to a step of 10 um, within which its slope changes by some per mille.
-        np.testing.assert_allclose((residual - there) / step, W[:, k], rtol=0.02 if known else 1e-6, atol=1e-6)
+        # The surface's slope is taken over 10 um, within which it changes by half a per mille.
+        np.testing.assert_allclose((residual - there) / step, W[:, k], rtol=1e-3 if known else 1e-6, atol=1e-6)
 
 
 def test_both_rows_are_in_metres_per_second_squared() -> None:
@@ -168,13 +168,13 @@ def test_it_starts_at_rest_where_it_is_and_tells_its_fields_in_order() -> None:
         time = (i + 1) * PERIOD
         measurement = start + 1e-3 * time * np.array([1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
         state, found = estimator.step(state, measurement)
-    told = dict(zip(ESTIMATE_FIELDS, found, strict=True))
-    assert len(CHANNELS) == 6 and len(ESTIMATE_FIELDS) == 16
+    told = {name: value for (name, _), value in zip(ESTIMATE_FIELDS, found, strict=True)}
     rear, front = RIG.rear_arm.value, RIG.front_arm.value
     heave = (rear * measurement[0] + front * measurement[1]) / (front + rear)
     np.testing.assert_allclose(found[:2], [heave, (measurement[0] - measurement[1]) / (front + rear)], atol=1e-6)
     np.testing.assert_allclose(found[2:4], [1e-3, 0.0], atol=2e-5)
     np.testing.assert_allclose(found[6:8], [measurement[0] - start[2], measurement[1] - start[3]], atol=1e-6)
     np.testing.assert_allclose(found[8:10], [1e-3, 1e-3], atol=2e-5)
-    assert found[12:14].tolist() == list(PRESSURES)
-    assert all(np.isfinite(value) for value in told.values())
+    assert (told["front_pressure"], told["rear_pressure"]) == PRESSURES
+    assert told["heave_rate"] == found[2] and told["front_height_rate"] == found[8]
+    assert np.isfinite(found).all()

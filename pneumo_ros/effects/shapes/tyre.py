@@ -20,7 +20,7 @@ from pneumo_ros.effects.shapes.atoms import Atom, Term
 
 RATES = (0.03, 0.15)  # m/s
 SLACKS = (3e-4, 1.5e-3)  # m
-# Shares of the compression at rest below which force is taken away
+# Shares of the compression at rest below which force is taken away; the one beyond the rest is nothing at it
 LIFTS = (0.0, 0.05, 0.15, 0.35, 0.7, 1.0, 1.4)
 
 ATOMS = (
