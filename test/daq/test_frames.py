@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import random
+import re
 import subprocess
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 from pneumo_ros.daq import cobs as ours
 from pneumo_ros.daq import frames
+from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.emulator.device import Device
 from pneumo_ros.daq.frames import Command, CommandFlag, FrameError, Kind, Record, Reject, Sample, decode, encode
 from pneumo_ros.daq.stream import StreamDecoder
@@ -241,3 +243,69 @@ def test_protocol_page_states_the_sizes_of_the_code() -> None:
         assert f"### 0x{kind:02x} {kind.name} " in page
         assert f"{kind.name} " in page and f", {size} bytes" in page.split(f" {kind.name} (")[1].splitlines()[0]
     assert set(frames.BODY_SIZE) == set(Kind)
+
+
+def test_protocol_page_states_the_numbers_of_the_code() -> None:
+    page = (FIRMWARE.parent / "docs" / "serial-protocol.md").read_text(encoding="utf-8")
+    for title, numbers in (("Channels", frames.Channel), ("Valves", frames.Valve)):
+        line = next(line for line in page.splitlines() if line.startswith(f"{title}: "))
+        told = re.findall(r"(\d+) (\w+)", line)
+        assert [(int(number), name) for number, name in told] == [(n.value, n.name.lower()) for n in numbers]
+    for flag in CommandFlag:
+        assert f"bit {flag.value.bit_length() - 1} {flag.name}" in page and flag.value.bit_count() == 1
+    for state in frames.DeviceState:
+        assert f"{state.value} {state.name}" in page
+    assert [fault.value for fault in frames.DeviceFault] == list(range(7))
+
+
+def hello_with(adc_bits: int = 16, dac_bits: int = 12, serial_number: str = "A") -> frames.Hello:
+    """What a board of these converters and this serial number is decoded as."""
+    board = board_identity()._replace(adc_bits=adc_bits, dac_bits=dac_bits, serial_number=serial_number)
+    hello = decode(encode(board)[:-1])
+    assert isinstance(hello, frames.Hello)
+    return hello
+
+
+@pytest.mark.parametrize(
+    ("field", "good", "bad"), [("adc_bits", (8, 9, 31, 32), (7, 33)), ("dac_bits", (8, 9, 15, 16), (7, 17, 0))]
+)
+def test_converters_have_a_width_that_counts_fit_in(field: str, good: tuple[int, ...], bad: tuple[int, ...]) -> None:
+    for bits in good:
+        assert getattr(hello_with(**{field: bits}), field) == bits
+    for bits in bad:
+        with pytest.raises(FrameError) as error:
+            hello_with(**{field: bits})
+        assert error.value.reason is Reject.VALUE
+
+
+def test_a_serial_number_is_printable() -> None:
+    assert hello_with(serial_number=" ~!}").serial_number == " ~!}"
+    for byte in ("\x1f", "\x7f", "a\nb"):
+        with pytest.raises(FrameError) as error:
+            hello_with(serial_number=byte)
+        assert error.value.reason is Reject.VALUE
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (bytes(frames.MAX_FRAME - 1), Reject.CRC),  # 254 bytes with their stuffing: the longest that is read
+        (bytes(frames.MAX_FRAME), Reject.OVERLONG),
+        (b"\x02\x01\x00", Reject.SHORT),
+        (b"\x02\x01\x00\x00", Reject.CRC),
+    ],
+)
+def test_lengths_at_the_edge(data: bytes, reason: Reject) -> None:
+    with pytest.raises(FrameError) as error:
+        decode(cobs.encode(data))
+    assert error.value.reason is reason
+
+
+@pytest.mark.parametrize(
+    ("version", "kind", "reason"), [(1, 1, Reject.VERSION), (3, 1, Reject.VERSION), (2, 3, Reject.KIND)]
+)
+def test_other_versions_and_kinds_are_refused(version: int, kind: int, reason: Reject) -> None:
+    payload = bytes([version, kind]) + bytes(4)
+    with pytest.raises(FrameError) as error:
+        decode(cobs.encode(payload + frames.checksum(payload).to_bytes(2, "little")))
+    assert error.value.reason is reason
