@@ -106,6 +106,7 @@ def test_bad_readings_are_withheld_at_once_and_told_after_some(channel: int, end
         assert bool(found) is (number == CONFIG.bad_samples)
     assert found[0].reason is Reason.SENSOR_RANGE and found[0].subject == SENSORS[channel]
     assert f"({sensors.last[channel]} counts)" in found[0].text
+    assert sensors.step()[1] != []  # and as long as it lasts
     sensors.values[channel] = AT_REST[channel]
     assert sensors.step() == ((True,) * 7, [])
     sensors.values[channel] = beyond
@@ -203,17 +204,29 @@ def test_the_mean_force_follows_over_the_window() -> None:
     assert scaled.ratios == pytest.approx([1.05, 1.05])
 
 
-def test_a_spring_on_its_stop_is_not_judged() -> None:
+@pytest.mark.parametrize("window", [0.5, 1.0, 1.5])
+def test_nothing_is_told_before_two_windows(window: float) -> None:
+    values = list(AT_REST)
+    values[4] = AMBIENT + gauge(0.4 * LOADS[0])
+    balance = ForceBalance(RIG, 0.3, window, SURFACE)
+    steps = next(n for n in range(1, 1000) if balance.step(values, 0.04))
+    assert (steps - 1) * 0.04 < 2.0 * window <= steps * 0.04 + 1e-9
+    balance.reset()
+    assert steps == next(n for n in range(1, 1000) if balance.step(values, 0.04))
+
+
+@pytest.mark.parametrize("deep", [0.0, 2e-3])
+def test_a_spring_on_its_stop_is_not_judged(deep: float) -> None:
     values = list(AT_REST)
     values[5] = AMBIENT + gauge(0.4 * LOADS[1])
     balance = ForceBalance(RIG, 0.3, 1.0, SURFACE)
     while not balance.step(values, 0.04):
         pass
     pressed = [*values]
-    pressed[2] = pressed[0] - BUMP_STOP_HEIGHT
+    pressed[2] = pressed[0] - BUMP_STOP_HEIGHT + deep
     assert balance.step(pressed, 0.04) == [] and balance.ratios == [1.0, 1.0]
     assert balance.step(values, 0.04) == []  # two windows from here on
-    pressed[2] -= 1e-6
+    pressed[2] -= deep + 1e-6
     balance.step(pressed, 0.04)
     assert balance.ratios[1] < 1.0
 
