@@ -78,6 +78,8 @@ def warm(tests: str, place: Path) -> Iterator[None]:
                 raise SystemExit("the warm process has ended")
             time.sleep(0.1)
         yield
+        if process.poll() is not None:
+            raise SystemExit("the warm process has ended: every mutant since then counts as killed, which says nothing")
     finally:
         process.kill()
         process.wait()
