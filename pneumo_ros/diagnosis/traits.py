@@ -63,6 +63,17 @@ class IsScreened(Protocol):
 
 
 @runtime_checkable
+class IsFollowed(Protocol):
+    """A sensor's error that leaves the reading alive."""
+
+    @property
+    def follows(self) -> float:
+        """Least share of what is there that the reading still follows at either end of its range; 0 where it may
+        stop.
+        """
+
+
+@runtime_checkable
 class HasLimits(Protocol):
     """A record that may forbid a verdict."""
 

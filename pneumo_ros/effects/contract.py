@@ -86,6 +86,8 @@ class Effect:
     guide : what people want to know of it
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
+    follows : of a sensor's error, the least share of what is there that a reading of the kind still follows at either
+        end of its range, 0 where it may stop
     """
 
     id: str
@@ -103,6 +105,7 @@ class Effect:
     slot: str = ""
     columns: tuple[int, ...] = ()
     screened: tuple[int, ...] = ()
+    follows: float = 0.0
 
     @property
     def place_in_kernel(self) -> str:

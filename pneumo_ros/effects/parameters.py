@@ -77,6 +77,11 @@ def is_law(effect: str) -> bool:
     return not effect.endswith(f".{SHAPE}") and family_of(effect) != ANYTHING
 
 
+# Share of what is there that the reading of a sensor whose scale is off still follows: one that stops has come to its
+# limit, which is an effect of another kind.
+STILL_FOLLOWS = 0.15
+
+
 @dataclass(frozen=True)
 class Derived:
     """A number that an effect's parameters give together, for the report: often better known than any of them.

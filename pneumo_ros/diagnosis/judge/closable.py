@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
@@ -21,11 +22,15 @@ from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced, with_parts
+from pneumo_ros.diagnosis.search.screening import SENSOR
+from pneumo_ros.diagnosis.traits import IsFollowed
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
 SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
+END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
+ENOUGH: Final = 20  # samples that have a slope [numerics]
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -48,6 +53,8 @@ class EffectEvidence:
         such place is known
     instead : gap left by whatever may act there in place of the effect, over what the structure leaves, rms; 1 where
         no such place is known
+    follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
+        follows, over the least that this kind of error leaves; infinite where nothing is asked
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -63,6 +70,7 @@ class EffectEvidence:
     leaves: float = 1.0
     beside: float = 1.0
     instead: float = 1.0
+    follows: float = np.inf
 
     @property
     def family(self) -> str:
@@ -127,11 +135,13 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
-        without, ceiling = held_by(problem, bare, holdout).total, remainders[at[law]]
+        missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
+        without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
+            follows=_followed(problem, holdout, missed.predicted, law, at[law]),
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
 
@@ -140,6 +150,28 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     if found and found[0].gap < (1.0 - WORTH) * own:
         evidence = problem.each(lambda one: _beside(problem, best, holdout, floor, one, found[0]), evidence)
     return Closable(tuple(evidence), tuple(found), own)
+
+
+def _followed(problem: Problem, holdout: Any, predicted: Array, law: Part, places: Sequence[str]) -> float:
+    """How far a reading follows, over what is asked of this kind of error; infinite where nothing is."""
+    effect = problem.model.effects[law[0]]
+    if not isinstance(effect, IsFollowed) or effect.follows <= 0.0:
+        return np.inf
+    channels = [problem.model.channels.index(place.removeprefix(SENSOR)) for place in places]
+    seen = holdout.weight > 0.0
+    return min(followed(holdout.measured[seen[:, k], k], predicted[seen[:, k], k]) for k in channels) / effect.follows
+
+
+def followed(reading: Array, there: Array) -> float:
+    """Share of what is there that a reading follows at the end of its range where it follows less: slope of a straight
+    line through the :data:`END` of its samples that are largest, and smallest. (N,) each, one unit; 1 for too few.
+    """
+    count = max(round(END * len(there)), ENOUGH)
+    if len(there) < 2 * count or not np.all(np.isfinite(there)):
+        return 1.0
+    order = np.argsort(there)
+    ends = (order[:count], order[-count:])
+    return min(float(np.cov(reading[k], there[k])[0, 1] / max(np.var(there[k], ddof=1), 1e-300)) for k in ends)
 
 
 def _beside(

@@ -195,7 +195,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it.
     if one.places[0].startswith(SENSOR):
-        against.append(one.own / max(one.without - one.own, 1e-12))
+        against += [one.own / max(one.without - one.own, 1e-12), 1.0 / max(one.follows, 1e-9)]
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

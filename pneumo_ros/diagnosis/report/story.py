@@ -316,6 +316,8 @@ def why_not(summary: Mapping[str, Any]) -> str:
         bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
         if bounded >= limits.at_bounds:
             reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
+        if float(evidence.get(f"follows:{effect}", 1.0)) < 1.0:
+            reasons.append("the reading stops at an end of its range, as that of a sensor at its limit does")
     if float(entry["shrink"]) <= 0.0:
         reasons.append("it does not shrink the held-out gap")
     if float(evidence.get("effects") or 0.0) == 0.0:

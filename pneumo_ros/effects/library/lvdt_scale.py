@@ -6,7 +6,7 @@ from __future__ import annotations
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import Effect, Memory, Values
 from pneumo_ros.effects.guide import Guide
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import STILL_FOLLOWS, EffectParameter
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
 
@@ -34,6 +34,7 @@ EFFECT = Effect(
     ),
     outputs=outputs,
     undo=undo,
+    follows=STILL_FOLLOWS,
     guide=Guide(
         meaning="An LVDT's sensitivity is off.",
         check=(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
 from pneumo_ros.effects.guide import Guide
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import STILL_FOLLOWS, EffectParameter
 from pneumo_ros.units import ATMOSPHERE
 
 
@@ -39,6 +39,7 @@ EFFECT = Effect(
     ),
     outputs=outputs,
     undo=undo,
+    follows=STILL_FOLLOWS,
     guide=Guide(
         meaning="A pressure sensor's sensitivity is off.",
         check=(

@@ -292,6 +292,7 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
             replace(SURE, places=("sensor:sprung_front",), own=k / (1.0 + k), ceiling=k / (1.0 + k)),
             FAR,
         ),
+        "a reading that stops": (replace(SURE, places=("sensor:front_pressure",), follows=1.0 / k), FAR),
     }
 
 

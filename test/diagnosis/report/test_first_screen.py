@@ -87,7 +87,8 @@ def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
     found = findings("unknown")
     curve = {"x": {"name": "height", "unit": "m"}, "y": {"name": "force", "unit": "N"},
              "points": [[-0.01, -3.0, -4.0, -2.0, 1.0], [0.01, 5.0, 4.0, 6.0, 1.0]]}  # fmt: skip
-    summary = {**found.summary, "evidence": {"closes:leak": 0.31, "effects": 1.0, "at_bounds:leak": 2.0},
+    summary = {**found.summary, "evidence": {"closes:leak": 0.31, "effects": 1.0, "at_bounds:leak": 2.0,
+                                                "follows:leak": 0.2},
                "remainder": {"share": 0.4, "places": ["front_force"], "curve": curve}}  # fmt: skip
     said = story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))
     facts = dict(said.facts)
@@ -96,6 +97,7 @@ def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
     assert (
         "leak closes 31 % of that, and half is needed" in facts["not it"] and "2 of its parameters" in facts["not it"]
     )
+    assert "the reading stops at an end of its range" in facts["not it"]
     assert "force over height: -3 N at -10 mm, 5 N at 10 mm" in facts["measured"]
 
 

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What speaks for an effect on the held-out log."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pneumo_ros.diagnosis.judge.closable import ENOUGH, followed
+from pneumo_ros.effects.parameters import STILL_FOLLOWS
+
+RNG = np.random.default_rng(5)
+THERE = 4e5 + 4e4 * np.sin(np.linspace(0.0, 60.0, 4000)) + RNG.normal(0.0, 8e3, 4000)  # Pa
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, -0.3])
+def test_a_scale_is_followed_by_its_sensitivity(share: float) -> None:
+    reading = 4e5 + share * (THERE - 4e5) + RNG.normal(0.0, 150.0, 4000)
+    assert followed(reading, THERE) == pytest.approx(share, abs=0.01)
+
+
+@pytest.mark.parametrize("upper", [True, False])
+def test_a_gauge_that_clips_follows_no_longer(upper: bool) -> None:
+    """A tenth of its readings stand at its limit, with the sensor's noise on them."""
+    limit = np.quantile(THERE, 0.9 if upper else 0.1)
+    clipped = (np.minimum if upper else np.maximum)(THERE, limit) + RNG.normal(0.0, 150.0, 4000)
+    assert abs(followed(clipped, THERE)) < 0.02 < STILL_FOLLOWS
+
+
+def test_a_curved_scale_still_follows() -> None:
+    """A cubic error that takes 0.7 of the sensitivity at the ends of the range."""
+    z = (THERE - 4e5) / np.max(np.abs(THERE - 4e5))
+    assert followed(4e5 + 5e4 * (z - 0.7 / 3.0 * z**3), 4e5 + 5e4 * z) > 2.0 * STILL_FOLLOWS
+
+
+def test_too_few_samples_and_a_run_that_failed_say_nothing() -> None:
+    assert followed(np.zeros(2 * ENOUGH - 1), np.arange(2.0 * ENOUGH - 1)) == 1.0
+    assert followed(THERE, np.where(THERE > 4.2e5, np.nan, THERE)) == 1.0
