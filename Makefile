@@ -8,7 +8,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint types unit colcon floors other headers bench mutants docs real blind blind-ci lock clean help
+.PHONY: demo test lint types unit colcon floors other other-environment headers bench mutants docs real blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
@@ -77,9 +77,11 @@ colcon: $(FLOORS_READY)  ## colcon build and colcon test of the fast part in tha
 OTHER ?= python3.13
 OTHERS = .venv-$(notdir $(patsubst %/bin/python,%,$(OTHER)))
 
-other:  ## The fast part on another Python (OTHER=python3.13; 2 min)
+other-environment:
 	test -e $(OTHERS)/.ready || { $(OTHER) -m venv $(OTHERS) && \
 		$(OTHERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' && touch $(OTHERS)/.ready; }
+
+other: other-environment  ## The fast part on another Python (OTHER=python3.13; 2 min)
 	$(OTHERS)/bin/python -m pytest $(FAST) -m "not slow" -k "not parquet"
 
 headers:  ## Add the SPDX line to source files that lack it
