@@ -10,7 +10,7 @@ from pneumo_ros.daq.actuation import Actuation, Mode
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.frames import Command, CommandFlag, decode
-from pneumo_ros.daq.reasons import Reason
+from pneumo_ros.daq.reasons import Finding, Reason
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.daq.scaling import output_scale
 
@@ -104,3 +104,111 @@ def test_the_sequence_wraps_at_32_bits() -> None:
     line.actuation._sequence = (1 << 32) - 2
     assert times(line, 2) == [1, 2]
     assert [command.sequence for command in line.sent] == [(1 << 32) - 1, 0]
+
+
+def ends(line: Line, expected_s: float, now: int = START) -> Finding:
+    """What the timeouts say first after ``expected_s`` from ``now``, and nothing a nanosecond earlier."""
+    limit = now + round(expected_s * 1e9)
+    assert line.actuation.tick(limit) is None
+    finding = line.actuation.tick(limit + 1)
+    assert finding is not None
+    return finding
+
+
+def test_armed_without_a_command_ends_after_its_time() -> None:
+    finding = ends(Line().armed(), SAFETY.arming.first_command)
+    assert (finding.reason, finding.subject) == (Reason.COMMAND_STALE, "command")
+    assert f"no command within {SAFETY.arming.first_command:.1f} s of arming" in finding.text
+
+
+def test_armed_with_an_old_command_ends_after_its_time() -> None:
+    line, late = Line().armed(), START + 3 * 10**9
+    assert line.actuation.command(AREAS, late, late) is None
+    finding = ends(line, SAFETY.timeouts.command, late)
+    assert finding.reason is Reason.COMMAND_STALE
+    assert finding.text == f"no fresh command for {SAFETY.timeouts.command * 1e3:.1f} ms"
+
+
+@pytest.mark.parametrize("resetting", [False, True])
+def test_a_board_that_does_not_follow_is_told(resetting: bool) -> None:
+    line = Line()
+    if resetting:
+        line.actuation.make_safe(START - 1, estop=True)
+        line.actuation.reset_estop(START)
+        assert line.sent[-1].flags == CommandFlag.RESET and line.actuation.mode is Mode.RESETTING
+    else:
+        line.actuation.arm(START)
+        assert line.actuation.mode is Mode.ARMING
+    finding = ends(line, SAFETY.arming.healthy_for)
+    assert (finding.reason, finding.subject) == (Reason.ARM_REFUSED, "board")
+    assert f"within {SAFETY.arming.healthy_for:.1f} s" in finding.text
+
+
+def test_safe_and_stopped_never_time_out() -> None:
+    for estop in (False, True):
+        line = Line()
+        line.actuation.make_safe(START, estop=estop)
+        assert line.actuation.mode is (Mode.ESTOP if estop else Mode.SAFE)
+        assert line.actuation.tick(START + 10**12) is None
+
+
+def test_an_emergency_stop_is_left_by_the_boards_word_alone() -> None:
+    line = Line()
+    line.actuation.make_safe(START, estop=True)
+    line.actuation.make_safe(START)  # another trip is no release
+    assert line.actuation.mode is Mode.ESTOP
+    line.actuation.board(SCALE, 8)
+    assert line.actuation.mode is Mode.ESTOP and line.actuation.session == 8
+    line.actuation.reset_estop(START)
+    line.actuation.make_safe(START)
+    assert line.actuation.mode is Mode.ESTOP
+    line.actuation.reset_estop(START)
+    line.actuation.board(SCALE)  # a board that restarts while it resets
+    assert line.actuation.mode is Mode.ESTOP and line.actuation.session == 0
+    line.actuation.reset_estop(START)
+    line.actuation.reset_done()
+    assert line.actuation.mode is Mode.SAFE
+
+
+def test_a_board_that_comes_back_is_safe_and_counts_anew() -> None:
+    line = Line().armed()
+    line.actuation.sample = 9
+    line.actuation.command(AREAS, START, START)
+    assert line.sent[-1].sample == 9 and line.sent[-1].session == 7 and line.sent[-1].sequence == 3
+    assert line.sent[-1].flags == CommandFlag.ARM and line.actuation.sent == 3
+    assert [number for number, _ in line.actuation.sent_ns] == [1, 2, 3]
+    line.actuation.board(SCALE, 8)
+    assert line.actuation.mode is Mode.SAFE and not line.actuation.sent_ns
+    line.actuation.tick(START + 10**9)
+    assert (line.sent[-1].session, line.sent[-1].sequence, line.sent[-1].sample) == (8, 1, 0)
+
+
+def test_commands_count_in_the_armed_mode_alone() -> None:
+    line = Line()
+    assert line.actuation.command(AREAS, START, START) is None
+    line.actuation.arm(START)
+    count = len(line.sent)
+    assert line.actuation.command(AREAS, START, START) is None
+    assert len(line.sent) == count and line.actuation.refused == 0
+    line.actuation.armed(START)
+    assert line.actuation.command(AREAS, START + 5, START + 5) is None
+    for stamp in (START + 5, START + 4):  # the same sample again, and one before it
+        finding = line.actuation.command(AREAS, stamp, START + 6)
+        assert finding is not None and "an older sample's than the last" in finding.text
+    assert line.actuation.refused == 2
+    finding = line.actuation.command((1.0, *AREAS[1:]), START + 7, START + 7)
+    assert finding is not None and finding.reason is Reason.COMMAND_INVALID
+    line.actuation.armed(START + 10**9)  # a new ride begins with its own first command
+    assert line.actuation.command(AREAS, START + 1, START + 1) is None
+    assert line.actuation.areas == SAFETY.safe_command
+
+
+def test_what_was_sent_is_kept_for_the_log() -> None:
+    line = Line().armed()
+    line.actuation.applied.clear()
+    line.actuation.command(AREAS, START, START)
+    late = START + round(SAFETY.arming.ramp * 1e9)
+    line.actuation.command(AREAS, late, late)
+    (first, last) = line.actuation.applied
+    assert (first.time_ns, first.areas) == (START, SAFETY.safe_command)
+    assert (last.time_ns, last.areas) == (late, AREAS)
