@@ -12,21 +12,25 @@ from __future__ import annotations
 
 import argparse
 import csv
+import json
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem
-from pneumo_ros.diagnosis.search.competition import compete
+from pneumo_ros.diagnosis.search.competition import compete, run_pairs
 from pneumo_ros.diagnosis.search.selection import Scored, advantage, score
 from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
-from pneumo_ros.effects.parameters import Active
+from pneumo_ros.effects.parameters import Active, is_law
 from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.files import new_file
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
+from pneumo_ros.workers import run_each
 
 SECONDS, RATE = 10.0, 500.0
 TABLE = Path(__file__).resolve().parent.parent / "config" / "tables" / "diagnosis_null.csv"
@@ -90,7 +94,7 @@ def drawn(model: RigModel, rng: np.random.Generator) -> np.ndarray:
 
 def drawn_effect(model: RigModel, rng: np.random.Generator) -> Active:
     """A random effect at a random site, between half and four times its typical size."""
-    effect = model.library[str(rng.choice(sorted(model.library)))]
+    effect = model.library[str(rng.choice(sorted(name for name in model.library if is_law(name))))]
     size = float(np.exp(rng.uniform(np.log(0.5), np.log(4.0))))
     values = [float(np.clip(p.typical * size, p.low, p.high)) if p.size else p.typical for p in effect.parameters]
     return Active(effect.id, str(rng.choice(effect.sites)), tuple(values))
@@ -112,29 +116,51 @@ def best_of(search: Search, size: int) -> Scored | None:
     return min(scored, key=lambda s: s.level, default=None)
 
 
+def row(seed: int, added: int) -> list[object]:
+    """One row of the table: the best win of an effect that is not there, as the ``added``-th one."""
+    model = RigModel(load_rig())
+    rng = np.random.default_rng([2026, seed])
+    nuisance, effect = drawn(model, rng), drawn_effect(model, rng)
+    truth = (effect,) if added == 2 else ()
+    problem = Problem(model, (make_log(model, nuisance, truth, seed),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    if truth:  # also where a diagnosis would look for no second effect, because too little is left
+        run_pairs(search)
+    poorer = best_of(search, 1) if truth else score(search.problem, search.refit)
+    richer = best_of(search, added)
+    if poorer is None or richer is None:
+        raise RuntimeError(f"seed {seed}: no structure of {added} effects was fitted")
+    label = " ".join(f"{a.effect}:{a.site}" for a in truth) or "none"
+    return [seed, added, label, *(round(v, 4) for v in win(poorer, richer))]
+
+
+def leave(place: Path, key: tuple[int, int]) -> None:
+    """Leave one row in a file of its own, whole or not at all; a row that is there is not made again."""
+    file = place / f"{key[0]}-{key[1]}.json"
+    if not file.exists():
+        with new_file(file) as part:
+            part.write_text(json.dumps(row(*key)), encoding="utf-8")
+
+
 def main() -> None:
-    """Run the seeds and write the table."""
+    """Make the rows that are missing and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=40)
+    parser.add_argument("--seeds", type=int, default=200)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--rows", type=Path, default=Path("null_rows"), help="folder of the rows made so far")
     parser.add_argument("--output", type=Path, default=TABLE)
     options = parser.parse_args()
-    model = RigModel(load_rig())
-    rows = []
-    for seed in range(options.seeds):
-        rng = np.random.default_rng([2026, seed])
-        nuisance, effect = drawn(model, rng), drawn_effect(model, rng)
-        for truth in ((), (effect,)):
-            log = make_log(model, nuisance, truth, seed)
-            search = compete(Problem(model, (log,)), Effort(), bool(truth), lambda share, what: None)
-            poorer = score(search.problem, search.refit) if not truth else best_of(search, 1)
-            richer = best_of(search, len(truth) + 1)
-            if poorer is None or richer is None:
-                continue
-            label = " ".join(f"{a.effect}:{a.site}" for a in truth) or "none"
-            rows.append((seed, len(truth) + 1, label, *(round(v, 4) for v in win(poorer, richer))))
-            print(*rows[-1], flush=True)
-            with options.output.open("w", newline="", encoding="utf-8") as handle:
-                csv.writer(handle, lineterminator="\n").writerows([COLUMNS, *rows])
+    options.rows.mkdir(parents=True, exist_ok=True)
+    keys = [(seed, added) for seed in range(options.seeds) for added in (1, 2)]
+    for key, error in run_each(partial(leave, options.rows), keys, options.workers):
+        print(*key, error or "done", flush=True)
+    made = [options.rows / f"{seed}-{added}.json" for seed, added in keys]
+    missing = [file.name for file in made if not file.exists()]
+    if missing:
+        raise SystemExit(f"{len(missing)} rows are missing, no table written: {', '.join(missing)}")
+    rows = [json.loads(file.read_text(encoding="utf-8")) for file in made]
+    with options.output.open("w", newline="", encoding="utf-8") as handle:
+        csv.writer(handle, lineterminator="\n").writerows([COLUMNS, *rows])
 
 
 if __name__ == "__main__":

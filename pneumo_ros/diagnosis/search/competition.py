@@ -76,7 +76,7 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     leading = shaped(search.problem, search.singles[:SHAPED])
     search.structures = [*leading, *_rivals_of_first(search)]
     if pairs and search.singles and room_for_more(search) and not _one_suffices(search):
-        _run_pairs(search)
+        run_pairs(search)
         _time_jumps(search)
     return search
 
@@ -193,7 +193,8 @@ def _merged(one: Sequence[CandidateScore], other: Sequence[CandidateScore]) -> l
     return [entry for both in zip_longest(one, other) for entry in both if entry is not None]
 
 
-def _run_pairs(search: Search) -> None:
+def run_pairs(search: Search) -> None:
+    """Fit the likeliest pairs to the end: a second effect beside each leading single, and both at once."""
     effort, problem = search.effort, search.problem
     search.progress(0.6, "screening pairs")
     seen: set[frozenset[Part]] = set()
