@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from pneumo_ros.arrays import Array
@@ -145,6 +146,7 @@ def by_column(
     return out, kept
 
 
+@lru_cache(maxsize=64)
 def ends_of(site: str) -> Ends:
     """Ends that a site covers; the whole rig is both."""
     return Ends(site in ("front", "both", ""), site in ("rear", "both", ""))

@@ -202,10 +202,10 @@ class Problem:
 
     def active(self, candidate: Candidate, values: Array) -> tuple[Active, ...]:
         """Its effects with values (SI)."""
-        out, first = [], 0
+        out, first, numbers = [], 0, values.tolist()
         for effect, site in candidate.parts:
             count = len(self.parameters_of[effect, site])
-            out.append(Active(effect, site, tuple(float(v) for v in values[first : first + count])))
+            out.append(Active(effect, site, tuple(numbers[first : first + count])))
             first += count
         return tuple(out)
 

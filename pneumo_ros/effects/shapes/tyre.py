@@ -20,6 +20,8 @@ from pneumo_ros.effects.shapes.atoms import Atom, Term
 
 RATES = (0.03, 0.15)  # m/s
 SLACKS = (3e-4, 1.5e-3)  # m
+LOADED = 0.02  # m of compression at which a loss over load is stated
+PER_RATE, PER_SLACK, PER_LOADED = tuple(1.0 / r for r in RATES), tuple(1.0 / s for s in SLACKS), 1.0 / LOADED
 # Shares of the compression at rest below which force is taken away; the one beyond the rest is nothing at it
 LIFTS = (0.0, 0.05, 0.15, 0.35, 0.7, 1.0, 1.4)
 
@@ -36,19 +38,19 @@ State = tuple[float, float]
 Values = tuple[float, ...]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
     """Sliders one step later."""
     move = tyre.rate * dt
-    return (min(max(z[0] + move / 3e-4, -1.0), 1.0), min(max(z[1] + move / 1.5e-3, -1.0), 1.0))
+    return (min(max(z[0] + move * PER_SLACK[0], -1.0), 1.0), min(max(z[1] + move * PER_SLACK[1], -1.0), 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def tyre(tyre: Tyre, z: State, p: Values) -> float:
     """Sum of the atoms."""
-    v, c, rest = tyre.rate, tyre.compression, tyre.rest
-    out = p[0] * v + p[1] * min(max(v / 0.03, -1.0), 1.0) + p[2] * min(max(v / 0.15, -1.0), 1.0)
-    out += p[3] * v * max(0.0, c) / 0.02 + p[4] * z[0] + p[5] * z[1]
+    v, c, rest, r = tyre.rate, tyre.compression, tyre.rest, PER_RATE
+    out = p[0] * v + p[1] * min(max(v * r[0], -1.0), 1.0) + p[2] * min(max(v * r[1], -1.0), 1.0)
+    out += p[3] * v * max(0.0, c) * PER_LOADED + p[4] * z[0] + p[5] * z[1]
     out += p[6] * max(0.0, -c) + p[7] * max(0.0, 0.05 * rest - c) + p[8] * max(0.0, 0.15 * rest - c)
     out += p[9] * max(0.0, 0.35 * rest - c) + p[10] * max(0.0, 0.7 * rest - c)
     out += p[11] * max(0.0, rest - c) + p[12] * (max(0.0, 1.4 * rest - c) - 0.4 * rest)
