@@ -10,6 +10,7 @@ docs/mutants.md keeps the results.
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import shutil
@@ -20,6 +21,9 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from cosmic_ray.work_db import WorkDB, use_db
+from cosmic_ray.work_item import WorkerOutcome, WorkResult
 
 ROOT = Path(__file__).resolve().parent.parent
 TREE = ROOT / "build" / "mutants"
@@ -67,6 +71,30 @@ def cosmic_ray(*arguments: str) -> str:
     return subprocess.run(command, cwd=TREE, env=environment(), check=True, capture_output=True, text=True).stdout
 
 
+def unevaluated(source: Path) -> list[ast.expr]:
+    """What is never evaluated (PEP 563): annotations of arguments, results and variables."""
+    found: list[ast.expr | None] = []
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.arg | ast.AnnAssign):
+            found.append(node.annotation)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            found.append(node.returns)
+    return [expression for expression in found if expression is not None]
+
+
+def skip_annotations(source: str) -> None:
+    """Leave out mutants that no test can notice, because nothing runs them."""
+    spans = [
+        ((one.lineno, one.col_offset), (one.end_lineno or one.lineno, one.end_col_offset or 0))
+        for one in unevaluated(TREE / source)
+    ]
+    with use_db(str(TREE / "session.sqlite"), WorkDB.Mode.open) as database:
+        for item in list(database.work_items):
+            (mutation,) = item.mutations
+            if any(first <= tuple(mutation.start_pos) < last for first, last in spans):
+                database.set_result(item.job_id, WorkResult(worker_outcome=WorkerOutcome.SKIPPED))
+
+
 @contextmanager
 def warm(tests: str, place: Path) -> Iterator[None]:
     """A process that has the libraries and runs the tests when asked; the first failing one ends a run."""
@@ -97,6 +125,7 @@ def main() -> None:
         place = Path(folder) / "warm"
         configured(source, place)
         cosmic_ray("init", "mutants.toml", "session.sqlite")
+        skip_annotations(source)
         with warm(tests, place):
             try:
                 cosmic_ray("baseline", "mutants.toml")
@@ -104,7 +133,7 @@ def main() -> None:
                 raise SystemExit(f"{tests} fails in the copy before any change: run it in {TREE}") from error
             cosmic_ray("exec", "mutants.toml", "session.sqlite")
     rows = [json.loads(line) for line in cosmic_ray("dump", "session.sqlite").splitlines()]
-    done = [(item, result) for item, result in rows if result is not None]
+    done = [(item, result) for item, result in rows if result is not None and result["worker_outcome"] != "skipped"]
     survivors = [(item, result) for item, result in done if result["test_outcome"] == "survived"]
     print(f"{sys.argv[1]}: {len(done)} mutants, {len(done) - len(survivors)} killed, {len(survivors)} survived")
     for item, result in survivors:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from helpers.simulated_rig import MS, START
 
@@ -11,7 +13,7 @@ from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.emulator.board import board_identity
 from pneumo_ros.daq.frames import Command, CommandFlag, decode
 from pneumo_ros.daq.reasons import Finding, Reason
-from pneumo_ros.daq.safety_config import load_safety
+from pneumo_ros.daq.safety_config import SafetyConfig, load_safety
 from pneumo_ros.daq.scaling import output_scale
 
 SAFETY = load_safety()
@@ -22,10 +24,10 @@ AREAS = (1e-6, 2e-6, 1e-6, 2e-6)
 class Line:
     """What an Actuation sends, decoded, on a clock that the test sets."""
 
-    def __init__(self) -> None:
+    def __init__(self, safety: SafetyConfig = SAFETY) -> None:
         self.sent: list[Command] = []
         self.discarded = 0
-        self.actuation = Actuation(SAFETY, self._take, self._discard)
+        self.actuation = Actuation(safety, self._take, self._discard)
         self.actuation.board(SCALE, 7)
 
     def _take(self, data: bytes) -> None:
@@ -38,9 +40,9 @@ class Line:
     def _discard(self) -> None:
         self.discarded += 1
 
-    def armed(self) -> Line:
-        self.actuation.arm(START)
-        self.actuation.armed(START)
+    def armed(self, now: int = START) -> Line:
+        self.actuation.arm(now)
+        self.actuation.armed(now)
         self.sent.clear()
         return self
 
@@ -212,3 +214,32 @@ def test_what_was_sent_is_kept_for_the_log() -> None:
     (first, last) = line.actuation.applied
     assert (first.time_ns, first.areas) == (START, SAFETY.safe_command)
     assert (last.time_ns, last.areas) == (late, AREAS)
+
+
+@pytest.mark.parametrize("now", [START, 3])
+def test_a_ride_begins_at_the_safe_command_and_ends_its_ramp_at_the_controllers(now: int) -> None:
+    """Valves that are safe open, on a clock of any age."""
+    safe, ramp = (3e-6, 1e-6, 2e-6, 5e-7), round(SAFETY.arming.ramp * 1e9)
+    line = Line(replace(SAFETY, safe_command=safe)).armed(now)
+    for share in (0.0, 0.25, 0.5, 1.0, 3.0):
+        at = now + round(share * ramp)
+        assert line.actuation.command(AREAS, at, at) is None
+        part = min(share, 1.0)
+        expected = [part * area + (1.0 - part) * rest for area, rest in zip(AREAS, safe, strict=True)]
+        assert line.actuation.areas == pytest.approx(expected)
+
+
+def test_a_command_is_fresh_until_its_time_on_a_clock_of_any_age() -> None:
+    line, limit = Line().armed(3), round(SAFETY.timeouts.command * 1e9)
+    assert line.actuation.command(AREAS, 4, 4) is None
+    for age in (limit // 7, limit // 2, limit):
+        assert line.actuation.tick(4 + age) is None
+    assert line.actuation.tick(4 + limit + 1) is not None
+    finding = line.actuation.command(AREAS, 5, 5 + limit + 1)
+    assert finding is not None and "ms old" in finding.text
+
+
+def test_a_safe_driver_asks_the_board_for_nothing() -> None:
+    line = Line()
+    line.actuation.tick(START + 10**9)
+    assert line.sent[-1].flags == CommandFlag(0)
