@@ -59,11 +59,15 @@ def _show(console: Console, effect: Effect) -> None:
     from pneumo_ros.cli.tables import plain_table
     from pneumo_ros.effects.guide import displayed
     from pneumo_ros.effects.sheet import check_words, parameter_rows, places_of, sites_of
+    from pneumo_ros.slots.half_car import SLOT_FAMILIES
 
     console.print(f"[bold]{effect.id}[/]: {escape(effect.summary)}")
     if effect.guide is not None:
         console.print(escape(effect.guide.meaning))
     console.print(f"\n[bold]acts at[/] {sites_of(effect)}; [bold]blamed on[/] {places_of(effect)}")
+    if effect.id in SLOT_FAMILIES:
+        kind, family = SLOT_FAMILIES[effect.id]
+        console.print(f"[bold]at a rig of your own[/]: {family} at a slot of kind {kind} (--rig-model)")
     console.print(plain_table(("parameter", "typical", "from", "to", "unit", "what it is"), parameter_rows(effect)))
     if effect.guide is None:
         return

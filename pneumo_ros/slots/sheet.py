@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.slots.guides import GUIDES, plain_check
+from pneumo_ros.slots.half_car import PARAMETERS_OF_THE_EQUATIONS, SLOT_FAMILIES
 from pneumo_ros.slots.kinds import Contact, Flow, Force, Input, Sensor, Slot
 from pneumo_ros.slots.laws import LAWS, Law
 from pneumo_ros.slots.library import families_of
@@ -15,7 +16,7 @@ KINDS: tuple[type[Slot], ...] = (Force, Contact, Flow, Input, Sensor)
 
 def families_page() -> str:
     """The page's body, Markdown."""
-    return "\n".join([*(_kind(kind) for kind in KINDS), _by_hand()])
+    return "\n".join([*(_kind(kind) for kind in KINDS), _by_hand(), _half_car()])
 
 
 def laws_of_family(family: str) -> list[tuple[str, str, str]]:
@@ -31,6 +32,20 @@ def _by_hand() -> str:
         others = "; ".join(f"`{other}` {words}" for other, words in guide.mistaken_for.items())
         rows.append(f"| `{family}` | {guide.meaning} | {plain_check(guide)} | {others} |")
     return "\n".join(rows) + "\n"
+
+
+def _half_car() -> str:
+    """Which family an effect of the half car is at a slot."""
+    rows = [f"| `{effect}` | {kind} | `{family}` |" for effect, (kind, family) in SLOT_FAMILIES.items()]
+    others = ", ".join(f"`{effect}`" for effect in PARAMETERS_OF_THE_EQUATIONS)
+    return (
+        "## The half car's effects\n\n"
+        "What [effects.md](effects.md) calls by the half car's parts, at a rig of your own:\n\n"
+        "| effect | kind of slot | family |\n|---|---|---|\n"
+        + "\n".join(rows)
+        + f"\n\nNot at a slot: {others}. They are "
+        "parameters of the equations, which a rig of your own states with a tolerance.\n"
+    )
 
 
 def _kind(kind: type[Slot]) -> str:

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pneumo_ros.effects.guide import displayed
+from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.effects.sheet import check_words
 from pneumo_ros.slots import Contact, Flow, Force, Input, Sensor
@@ -15,6 +16,7 @@ from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
 from pneumo_ros.slots.guides import GUIDES
+from pneumo_ros.slots.half_car import PARAMETERS_OF_THE_EQUATIONS, SLOT_FAMILIES
 from pneumo_ros.slots.kinds import Slot
 from pneumo_ros.slots.laws import LAWS, Law, Measures
 from pneumo_ros.slots.library import SlotEffect, effects_of, families_of
@@ -173,3 +175,9 @@ def test_an_actuator_that_cannot_be_faster_follows_at_its_rate() -> None:
     np.testing.assert_allclose(si.passed(step, 0.01, P, S), np.minimum(2.0 * time, 3.0), atol=1e-9)
     slow = 0.3 * np.sin(2.0 * time)
     np.testing.assert_allclose(si.passed(slow, 0.01, P, S), slow, atol=1e-12)
+
+
+def test_every_effect_of_the_half_car_is_a_family_at_a_slot_or_a_parameter() -> None:
+    assert set(SLOT_FAMILIES) | set(PARAMETERS_OF_THE_EQUATIONS) == set(laws_of(load_library()))
+    for kind, family in SLOT_FAMILIES.values():
+        assert family in families_of(kind)
