@@ -55,8 +55,8 @@ SUFFICES_OF_REFIT: Final = 0.05  # the same beside it, as a share (rms) of what 
 SHAPED: Final = 3  # leading singles that are fitted with their shapes [numerics]
 PROBED: Final = 45  # singles that are probed, of some seventy that move anything [numerics]
 RIVALS: Final = 3  # other families at the leading single's place that are fitted with their shapes [numerics]
-# Most iterations of the refit, against which everything else is measured: in one null in twelve it stood 20 above its
-# minimum after ten, and any effect's fit then took what it had left (bench/null_distribution.py) [numerics]
+# Most iterations of the refit, against which everything else is measured: of some nulls it stood 20 above its minimum
+# after ten, and any effect's fit then took what it had left (bench/null_distribution.py) [numerics]
 PATIENT: Final = 40
 STARTED_TWICE: Final = 3  # leading singles whose shape parameters are started from elsewhere as well [numerics]
 

@@ -37,6 +37,8 @@ LAW_SHARE: Final = 0.01  # of the refit's root mean square: what right laws leav
 # Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
 # laws differ by more than chance does [calibration: development cases of 0.3]
 SHARPNESS: Final = 36.0
+# Of what nulls win: the highest that 160 rigs tell within 20 % (test_null_table.py) [definition]
+NULL_QUANTILE: Final = 0.95
 # Log weight that each unknown used costs: what could fit anything proves less [calibration: set 0.4, opened]
 PER_UNKNOWN: Final = 1.0
 
@@ -70,26 +72,35 @@ class Thresholds:
 
 @lru_cache(maxsize=1)
 def null_thresholds() -> Thresholds:
-    """The floors of :class:`Thresholds`, raised to what the worst of the null distribution wins by.
-
-    The table (config/tables/diagnosis_null.csv) holds, for simulated rigs inside their tolerances, what the best effect
-    won that was not there: over the refit (``added`` 1) and on top of a true effect (``added`` 2).
-    """
+    """The floors of :class:`Thresholds`, raised to the :data:`NULL_QUANTILE` of what nulls win by."""
     floor = Thresholds()
-    with share_file("config", "tables", "diagnosis_null.csv").open(newline="", encoding="utf-8") as handle:
-        rows = list(csv.DictReader(handle))
 
-    def worst(column: str, added: int) -> float:
-        return max((float(row[column]) for row in rows if int(row["added"]) == added), default=0.0)
+    def chance(column: str, added: int) -> float:
+        return float(np.quantile(null_wins(column, added), NULL_QUANTILE))
 
     return replace(
         floor,
-        first=max(floor.first, worst("advantage", 1)),
-        second=max(floor.second, worst("advantage", 2)),
-        first_cost=max(floor.first_cost, worst("cost", 1)),
-        second_cost=max(floor.second_cost, worst("cost", 2)),
-        least=max(floor.least, worst("fall", 1)),
+        first=max(floor.first, chance("advantage", 1)),
+        second=max(floor.second, chance("advantage", 2)),
+        first_cost=max(floor.first_cost, chance("cost", 1)),
+        second_cost=max(floor.second_cost, chance("cost", 2)),
+        least=max(floor.least, chance("fall", 1)),
     )
+
+
+def null_wins(column: str, added: int) -> Array:
+    """What the best effect won that was not there, on simulated rigs inside their tolerances, one value a rig.
+
+    Parameters
+    ----------
+    column : "advantage" (fall of the log mean square on the kept blocks), "fall" (of the mean square, sigma squared),
+        "cost" (of the training cost) or "relief" (of the squares of stretched tolerances)
+    added : 1: over the refit where nothing is missing; 2: on top of a true effect
+
+    Source: config/tables/diagnosis_null.csv, made by bench/null_distribution.py.
+    """
+    with share_file("config", "tables", "diagnosis_null.csv").open(newline="", encoding="utf-8") as handle:
+        return np.array([float(row[column]) for row in csv.DictReader(handle) if int(row["added"]) == added])
 
 
 @dataclass(frozen=True)
