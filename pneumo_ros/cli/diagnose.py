@@ -124,8 +124,9 @@ def diagnose(
     with ExitStack() as held:
         if against is not None:
             own = held.enter_context(fitted_half_car(console, against, own, effect or (), pairs))
-        task = prepared(fit, holdout, own, edit, effect or (), without or ())
-    options = Options(pairs=pairs, experiment=design_experiment, threads=os.cpu_count() or 1)
+        threads = os.cpu_count() or 1
+        task = prepared(fit, holdout, own, edit, effect or (), without or (), threads)
+    options = Options(pairs=pairs, experiment=design_experiment, threads=threads)
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))

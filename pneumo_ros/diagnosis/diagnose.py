@@ -36,7 +36,9 @@ from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 
 Piece = TypeVar("Piece", bound=Sliceable)
-Locate = Callable[[Any, Sequence[Any], Any, Array | None, Sequence[Active]], Whereabouts]
+Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a structure
+# (model, fit logs, held-out log, a structure or None, threads) -> of what the nominal model leaves, and of what it does
+Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]
 LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
 SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]
 # Share of the library that the excitation cannot show, above which "none" would say nothing [taste]
@@ -55,8 +57,7 @@ class Options:
     effort : how many candidates are fitted
     limits : what counts as evidence
     calibration : constants of the probabilities
-    locate : (model, fit logs, held-out log, nuisance or None for nominal, active) -> :class:`Whereabouts` of what that
-        structure leaves
+    locate : places of what structures leave, see :data:`Locate`
     experiment : design the experiment that splits an ambiguity group
     threads : simulations at a time
     """
@@ -257,11 +258,10 @@ def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts |
     """
     if locate is None:
         return None, None
-    problem, holdout = outcome.problem, outcome.holdout
-    before = locate(problem.model, problem.records, holdout, None, ())
-    if outcome.best is outcome.base:
-        return before, before
-    return before, locate(problem.model, problem.records, holdout, outcome.nuisance, outcome.active)
+    problem = outcome.problem
+    fitted = None if outcome.best is outcome.base else (outcome.nuisance, tuple(outcome.active))
+    before, after = locate(problem.model, problem.records, outcome.holdout, fitted, problem.threads)
+    return before, before if fitted is None else after
 
 
 def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:

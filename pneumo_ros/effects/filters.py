@@ -54,7 +54,7 @@ def _next(a: float, b: float, u: float, following: float, A: Array, B0: Array, B
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _run(
     u: Array, fresh: bool, a: float, b: float, last: float, A: Array, B0: Array, B1: Array, C: Array, D: float
 ) -> tuple[Array, float, float]:
@@ -135,7 +135,7 @@ def delayed_hold(u: Array, period: float, delay: float, memory: Array | None = N
     return (1.0 - part) * padded[1 : 1 + len(u)] + part * padded[: len(u)], padded[len(u) :]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def played(u: Array, half: float, held: float) -> Array:
     """Backlash: the follower (N,) moves only when pushed."""
     y = np.empty_like(u)
@@ -145,7 +145,7 @@ def played(u: Array, half: float, held: float) -> Array:
     return y
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def slewed(u: Array, most: float) -> Array:
     """What follows its input (N,) by at most so much a sample, from where that begins."""
     y, held = np.empty_like(u), u[0]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.diagnose import Fitted
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.judge.held_out import total_floor
@@ -24,10 +25,18 @@ NEAR_FLOOR = 1.5  # of the floor: nothing to look for below
 
 
 def whereabouts(
-    model: OwnRig, records: Sequence[OwnRecord], holdout: OwnRecord, nuisance: Array | None, active: Sequence[Active]
+    model: OwnRig, records: Sequence[OwnRecord], holdout: OwnRecord, fitted: Fitted | None, threads: int
+) -> tuple[Whereabouts, Whereabouts | None]:
+    """Places of what structures leave; as :data:`pneumo_ros.diagnosis.diagnose.Locate`."""
+    problem = Problem(model, tuple(records), threads=threads)
+    before = _left(problem, model, holdout, None, ())
+    return before, None if fitted is None else _left(problem, model, holdout, *fitted)
+
+
+def _left(
+    problem: Problem, model: OwnRig, holdout: OwnRecord, nuisance: Array | None, active: Sequence[Active]
 ) -> Whereabouts:
-    """Places of what a structure leaves; as :data:`pneumo_ros.diagnosis.diagnose.Locate`."""
-    problem = Problem(model, tuple(records))
+    """Places of what one structure leaves."""
     base = _base(problem, nuisance, active)
     floor = total_floor(holdout)
     own = held_by(problem, base, holdout).total

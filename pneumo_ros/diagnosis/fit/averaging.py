@@ -23,7 +23,7 @@ def grouped(samples: Array, count: int) -> Array:
     return samples[: whole * count].reshape(whole, count, -1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def average(samples: Array, count: int) -> Array:
     """Means (N // count, C) of ``count`` rows; a remainder is dropped."""
     out = np.zeros((samples.shape[0] // count, samples.shape[1]))
@@ -36,7 +36,7 @@ def average(samples: Array, count: int) -> Array:
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def between(rows: Array, count: int) -> Array:
     """(count, C) where every other row is given: the ones between by linear interpolation, after the last its value."""
     out = np.empty((count, rows.shape[1]))

@@ -43,7 +43,7 @@ def bounded_newton(H: Array, g: Array, low: Array, high: Array) -> Array:
     return np.clip(move, low, high)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def box_minimum(gram: Array, cross: Array, low: Array, high: Array) -> Array:
     """Minimum of x'Gx/2 - c'x inside a box, by coordinate descent until no coordinate moves by 1e-5.
 

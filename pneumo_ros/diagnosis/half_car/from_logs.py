@@ -5,21 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.diagnose import Options, diagnose, split_by_time
+from pneumo_ros.diagnosis.diagnose import Fitted, Options, diagnose, split_by_time
+from pneumo_ros.diagnosis.fit.together import each
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.signals.wiring import check_wiring
-from pneumo_ros.diagnosis.where import Location, flexible_gain, locate
+from pneumo_ros.diagnosis.where import Location, Start, flexible_gain, locate
 from pneumo_ros.effects.configured import library_of, with_files
 from pneumo_ros.effects.loading import origins, own_ids
-from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import Rig
@@ -39,7 +39,7 @@ class Task:
         """Run the diagnosis, with the places of what is left found by flexible corrections."""
         chosen = options or Options()
         if chosen.locate is None:
-            chosen = replace(chosen, locate=FlexibleSearch())
+            chosen = replace(chosen, locate=flexible_search)
         found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
         return replace(found, notes=(*self.notes, *found.notes))
 
@@ -51,6 +51,7 @@ def prepared(
     edit: str | Path | None = None,
     effects: Sequence[str | Path] = (),
     without: Sequence[str] = (),
+    threads: int = 1,
 ) -> Task:
     """Read the logs and build the model.
 
@@ -62,6 +63,7 @@ def prepared(
     edit : log of the rig after a known change (its own configuration states the change)
     effects : Python files with further effects
     without : ids of effects that must not compete
+    threads : simulations at a time
 
     Raises
     ------
@@ -88,7 +90,7 @@ def prepared(
     else:
         held = read_signals(holdout, rig)
         check_pair(logs, held)
-    logs, held = [_as_wired(model, log) for log in logs], _as_wired(model, held)
+    *logs, held = each(threads, partial(_as_wired, model), (*logs, held))
     changed = None if edit is None else read_signals(edit)
     if changed is not None:
         notes += _about_edit(model, changed)
@@ -151,29 +153,24 @@ def diagnose_files(
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose logs; parameters as in :func:`prepared`."""
-    return prepared(fit, holdout, rig, edit, effects, without).diagnose(options, progress)
+    threads = 1 if options is None else options.threads
+    return prepared(fit, holdout, rig, edit, effects, without, threads).diagnose(options, progress)
 
 
-class FlexibleSearch:
-    """Places of what a structure leaves, by flexible corrections of its equations in weak form.
-
-    Keeps the search from the nominal model, which later structures are measured against.
+def flexible_search(
+    model: RigModel, fit: Sequence[Signals], holdout: Signals, fitted: Fitted | None, threads: int
+) -> tuple[Whereabouts, Whereabouts | None]:
+    """Places of what structures leave, by flexible corrections of their equations in weak form; as
+    :data:`pneumo_ros.diagnosis.diagnose.Locate`.
     """
 
-    def __init__(self) -> None:
-        self.first: Location | None = None
+    def located(start: Start) -> Location:
+        return locate(model, fit, holdout, start)
 
-    def __call__(
-        self,
-        model: RigModel,
-        fit: Sequence[Signals],
-        holdout: Signals,
-        nuisance: Array | None,
-        active: Sequence[Active],
-    ) -> Whereabouts:
-        if nuisance is None:
-            self.first = found = locate(model, fit, holdout)
-            return Whereabouts(found.shares, found.level["refit"], found.level["chosen"], found.flat)
-        gain = flexible_gain(model, fit, holdout, nuisance, active, self.first)
-        flat = not gain.places
-        return Whereabouts(gain.shares, float(np.sqrt(gain.left)), float(np.sqrt(gain.mended)), flat, gain.kept)
+    first, *further = each(threads, located, [Start(), *([] if fitted is None else [Start(*fitted)])])
+    before = Whereabouts(first.shares, first.level["refit"], first.level["chosen"], first.flat)
+    if not further:
+        return before, None
+    gain = flexible_gain(first, further[0])
+    left, mended = float(np.sqrt(gain.left)), float(np.sqrt(gain.mended))
+    return before, Whereabouts(gain.shares, left, mended, not gain.places, gain.kept)

@@ -121,7 +121,7 @@ def _stepped(x: State, k: State, dt: float) -> State:
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def run_conditional(
     start: Array,
     fed: Array,

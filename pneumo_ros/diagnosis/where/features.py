@@ -190,7 +190,7 @@ def _end(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _flows(pressure: Array, gas: Gas) -> tuple[Array, Array, Array]:
     count = len(pressure)
     into, out, power = np.empty(count), np.empty(count), np.empty(count)
@@ -216,7 +216,7 @@ def resonated(series: Array, frequency: float, damping: float, period: float) ->
     return np.asarray(lfilter(numerator[0], denominator, series - series[0]) + series[0])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def dragged(series: Array, slack: float) -> Array:
     """Elastic-plastic (stop) element: follows ``series`` until ``slack``, then slips; output in -1..1."""
     out = np.empty(len(series))

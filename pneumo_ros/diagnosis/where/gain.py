@@ -8,17 +8,12 @@ law is found out where its forces and flows are not those of the rig.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.signals import Signals
-from pneumo_ros.diagnosis.where.locate import Location, Start, corrected_residual, locate
-from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.diagnosis.where.locate import Location, corrected_residual
 
 # Mean square, null standard deviations, that noise, tolerances and model form leave anyway [definition]
 EXPLAINED: Final = 1.0
@@ -61,24 +56,13 @@ class FlexibleGain:
         return max(self.left - EXPLAINED, 0.0) / max(self.before - EXPLAINED, EXPLAINED)
 
 
-def flexible_gain(
-    model: RigModel,
-    fit: Sequence[Signals],
-    judge: Signals,
-    nuisance: Array,
-    active: Sequence[Active],
-    before: Location | None = None,
-) -> FlexibleGain:
+def flexible_gain(nominal: Location, found: Location) -> FlexibleGain:
     """Judge a structure by the equations of a log it was not fitted to.
 
     Parameters
     ----------
-    model, fit, judge : as in :func:`~pneumo_ros.diagnosis.where.locate.locate`
-    nuisance, active : the fitted structure
-    before : ``locate(model, fit, judge)`` if it is at hand
+    nominal, found : places of what the nominal model leaves of the logs, and of what the structure does
     """
-    nominal = before or locate(model, fit, judge)
-    found = locate(model, fit, judge, Start(nuisance, tuple(active)))
     left, mended = found.level["refit"] ** 2, found.level["chosen"] ** 2
     return FlexibleGain(nominal.level["refit"] ** 2, left, mended, _spread(found), found.chosen, found.shares)
 

@@ -91,7 +91,7 @@ def make_windows(rows: int, period: float, half_width: float = HALF_WIDTH) -> Wi
     return Windows(np.arange(reach, rows - reach - 1, reach), window)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def averaged(series: Array, kernel: Array, centres: NDArray[np.intp]) -> Array:
     """Sum of ``series`` (N,) under a window's ``kernel`` at each of the ``centres``' rows, (K,)."""
     out = np.empty(len(centres))
@@ -103,7 +103,7 @@ def averaged(series: Array, kernel: Array, centres: NDArray[np.intp]) -> Array:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _forces(height: Array, pressure: Array, scale: float, ambient: float, body: Body, surface: AreaSurface) -> Array:
     out = np.empty(len(height))
     for i in range(len(height)):
@@ -113,7 +113,7 @@ def _forces(height: Array, pressure: Array, scale: float, ambient: float, body: 
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _mass_and_flow(height: Array, pressure: Array, inlet: Array, outlet: Array, gas: Gas) -> tuple[Array, Array]:
     """Air mass (N,) and net inflow (N,), the latter the mean over each interval with its command held."""
     count = len(height)

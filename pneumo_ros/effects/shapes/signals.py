@@ -77,7 +77,7 @@ def _play(half: float) -> Filter:
     return passed
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _followed(u: Array, up: float, down: float, most: float, held: float) -> Array:
     y = np.empty_like(u)
     for i in range(u.shape[0]):

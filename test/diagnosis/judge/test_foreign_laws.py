@@ -8,7 +8,7 @@ import pytest
 from helpers.own_logs import QUICK, drawn, log
 
 from pneumo_ros.diagnosis.diagnose import Options, diagnose
-from pneumo_ros.diagnosis.half_car.from_logs import FlexibleSearch
+from pneumo_ros.diagnosis.half_car.from_logs import flexible_search
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -37,7 +37,7 @@ def found_on(model: RigModel, *truth: Active) -> Diagnosis:
         model,
         [log(model, 1, nuisance, truth)],
         log(model, 2, nuisance, truth),
-        Options(effort=QUICK, locate=FlexibleSearch()),
+        Options(effort=QUICK, locate=flexible_search),
     )
 
 

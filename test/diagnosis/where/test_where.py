@@ -221,14 +221,15 @@ def test_a_wrong_structure_keeps_the_gap_and_the_right_one_does_not(model: RigMo
     fit, holdout = log_with(model, friction, 6), log_with(model, friction, 7)
     nominal = np.array([p.nominal for p in model.parameters])
     before = locate(model, [fit], holdout)
-    right = flexible_gain(model, [fit], holdout, nominal, friction, before)
+    right = flexible_gain(before, locate(model, [fit], holdout, Start(nominal, tuple(friction))))
     damping = (Active("viscous_damping", "rear", (40.0, 0.0)),)
-    wrong = flexible_gain(model, [fit], holdout, nominal, damping, before)
+    wrong = flexible_gain(before, locate(model, [fit], holdout, Start(nominal, damping)))
     assert right.kept < 0.05 and right.log_ratio == pytest.approx(0.0, abs=0.1) and right.places == ()
     assert wrong.kept > 0.3 and wrong.log_ratio > 1.0 and wrong.places == ("rear_force",)
     assert 0.0 < wrong.spread < 0.5 * wrong.log_ratio
     nothing = log_with(model, (), 6), log_with(model, (), 7)
-    assert flexible_gain(model, [nothing[0]], nothing[1], nominal, ()).log_ratio == 0.0
+    same = locate(model, nothing[:1], nothing[1])
+    assert flexible_gain(same, locate(model, nothing[:1], nothing[1], Start(nominal))).log_ratio == 0.0
 
 
 def test_effects_act_along_the_measured_motion(model: RigModel) -> None:
