@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import itertools
 import os
 import signal
@@ -11,7 +12,10 @@ import subprocess
 import sys
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from pneumo_ros.session.claim import runtime_folder
 
@@ -108,17 +112,37 @@ def kill(pid: int) -> None:
     os.kill(pid, signal.SIGKILL)
 
 
+@contextmanager
+def own_context(domain: int | None = None, arguments: list[str] | None = None) -> Iterator[Any]:
+    """A Context for nodes within the test's process, in a domain of its own or in that of a session.
+
+    The arguments are those of ROS that a program of its own would get. Its nodes end with it: one that the garbage
+    collector ends later, in the middle of another test, takes the publisher of /rosout from every node of its name.
+    """
+    import rclpy
+    from rclpy.context import Context
+    from rclpy.node import Node
+    from rclpy.signals import SignalHandlerOptions
+
+    context = Context()
+    used = own_domain() if domain is None else domain
+    rclpy.init(args=arguments, context=context, domain_id=used, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        yield context
+    finally:
+        for node in [o for o in gc.get_objects() if issubclass(type(o), Node) and o.context is context]:
+            node.destroy_node()
+        context.try_shutdown()
+
+
 def set_parameter(domain: int, node: str, name: str, value: object, timeout: float = 20.0) -> str:
     """Set a parameter of a running node as `ros2 param set` does; '' or the reason it was refused."""
     import rclpy
-    from rclpy.context import Context
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
     from rclpy.parameter_client import AsyncParameterClient
 
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    try:
+    with own_context(domain) as context:
         asker = rclpy.create_node("asker", context=context)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(asker)
@@ -129,5 +153,3 @@ def set_parameter(domain: int, node: str, name: str, value: object, timeout: flo
         result = future.result()
         assert result is not None, f"{node} did not answer"
         return "" if result.results[0].successful else str(result.results[0].reason)
-    finally:
-        context.try_shutdown()

@@ -245,10 +245,8 @@ def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
 @pytest.mark.realtime
 def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
     """The first watchdog, on monotonic time: within 50 ms of the last estimate the valves are asked to close."""
-    context = Context()
-    rclpy.init(context=context, domain_id=sessions.own_domain())
-    executor = SingleThreadedExecutor(context=context)
-    try:
+    with sessions.own_context() as context:
+        executor = SingleThreadedExecutor(context=context)
         node = ControllerNode(context, {"mode": "realtime", "session_nodes": "controller"})
         other = rclpy.create_node("other", context=context)
         commands: list[tuple[float, list[float]]] = []
@@ -273,9 +271,6 @@ def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
         closed = [when for when, areas in commands if when > last and areas == [0.0] * 4]
         assert before and max(before[-1]) > 0.0
         assert len(closed) > 10 and closed[0] - last < 0.05 + (closed[1] - closed[0])
-    finally:
-        executor.shutdown()
-        context.try_shutdown()
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import pytest
 pytest.importorskip("rclpy")
 import rclpy
 from helpers import sessions
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
@@ -25,9 +24,7 @@ from pneumo_ros.rig.joints import JOINTS, joint_positions
 
 
 def test_joint_states_and_urdf_beside_a_session() -> None:
-    context = Context()
-    rclpy.init(context=context, domain_id=sessions.own_domain())
-    try:
+    with sessions.own_context() as context:
         bridge = JointStatesNode(context, {"publish_rate": 1000.0})
         other = rclpy.create_node("other", context=context)
         states: list[JointState] = []
@@ -52,5 +49,3 @@ def test_joint_states_and_urdf_beside_a_session() -> None:
         assert tuple(states[0].name) == JOINTS and states[0].header.stamp.sec == 7
         np.testing.assert_allclose(states[0].position, wanted)
         assert ElementTree.fromstring(descriptions[0].data).get("name") == load_rig().name
-    finally:
-        context.try_shutdown()

@@ -36,10 +36,8 @@ REAL_TIME = {"mode": "realtime"}
 
 @pytest.fixture
 def context() -> Iterator[Context]:
-    made = Context()
-    rclpy.init(context=made, domain_id=sessions.own_domain())
-    yield made
-    made.try_shutdown()
+    with sessions.own_context() as made:
+        yield made
 
 
 def overrides(topic: str, kind: str, **policies: Any) -> dict[str, Any]:
@@ -151,15 +149,11 @@ def test_dumped_parameters_start_the_same_node_again(context: Context, tmp_path:
     document = dumped(context, first)
     file = tmp_path / "estimator.yaml"
     file.write_text(yaml.safe_dump(document), encoding="utf-8")
-    again = Context()
-    rclpy.init(args=["--ros-args", "--params-file", str(file)], context=again, domain_id=sessions.own_domain())
-    try:
+    with sessions.own_context(arguments=["--ros-args", "--params-file", str(file)]) as again:
         second = EstimatorNode(again)
         assert dumped(again, second) == document
         profile = next(p for p in second.publishers if p.topic_name == STATE).qos_profile
         assert profile.depth == 9 and profile.history is HistoryPolicy.KEEP_LAST
-    finally:
-        again.try_shutdown()
     read = read_config(file, node_tables())["estimator"]
     assert read["rate_hz"] == 400.0 and read[f"qos_overrides.{STATE}.publisher.depth"] == 9
     third = EstimatorNode(context, read)

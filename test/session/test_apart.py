@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip("rclpy")
 import rclpy
 from helpers import sessions
-from rclpy.context import Context
 from sensor_msgs.msg import JointState
 
 from pneumo_ros.log import topics
@@ -53,13 +52,9 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Log:
 @contextmanager
 def intruder(domain: int, topic: str) -> Iterator[Any]:
     """A node that publishes what belongs to a session."""
-    context = Context()
-    rclpy.init(context=context, domain_id=domain)
-    node = rclpy.create_node("intruder", context=context)
-    try:
+    with sessions.own_context(domain) as context:
+        node = rclpy.create_node("intruder", context=context)
         yield node.create_publisher(JointState, topic, 10)
-    finally:
-        context.try_shutdown()
 
 
 @pytest.mark.slow

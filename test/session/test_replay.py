@@ -34,10 +34,9 @@ from pneumo_ros.session.transport import SECOND, Transport
 from pneumo_ros.session.what_if import CAVEAT
 
 rclpy = pytest.importorskip("rclpy")
-from helpers.sessions import own_domain  # noqa: E402
+from helpers.sessions import own_context, own_domain  # noqa: E402
 from rclpy.context import Context  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from std_msgs.msg import Bool  # noqa: E402
 
 from pneumo_ros.nodes.base import StopRequest  # noqa: E402
@@ -58,10 +57,8 @@ run = CliRunner().invoke
 
 @pytest.fixture(scope="module")
 def context() -> Iterator[Context]:
-    made = Context()
-    rclpy.init(context=made, domain_id=own_domain(), signal_handler_options=SignalHandlerOptions.NO)
-    yield made
-    rclpy.try_shutdown(context=made)
+    with own_context() as made:
+        yield made
 
 
 @pytest.fixture(scope="module")
