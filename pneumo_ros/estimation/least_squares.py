@@ -98,12 +98,11 @@ def update(
     """
     size = a.shape[0]
     if method == GRADIENT:
-        fade, weight, grown = 1.0, period, P
+        weight, grown = period, P
     else:
         factor = forgetting_factor(method, P, forgetting, bound)
-        fade = math.exp(-factor * period)
         weight = -math.expm1(-factor * period) / factor if factor > 1e-12 else period
-        grown = P / fade
+        grown = P / math.exp(-factor * period)
     information = _inverse(grown)
     for i in range(size):
         for j in range(size):

@@ -144,13 +144,14 @@ def test_the_norm_of_a_gain_is_its_largest_eigenvalue(P: list[list[float]]) -> N
 
 
 @pytest.mark.parametrize("size", [1, 2])
-def test_one_step_is_that_of_numpys_inverses(size: int) -> None:
+@pytest.mark.parametrize("forgetting", [4.0, 0.5])
+def test_one_step_is_that_of_numpys_inverses(size: int, forgetting: float) -> None:
     """The discrete form by matrices: information fades and grows by the regressor; the gain moves the parameters."""
     rng = np.random.default_rng(size)
     W, residual, a = rng.normal(size=(2, size)), rng.normal(size=2), rng.normal(size=size)
     root = rng.normal(size=(size, size))
     P = initial_gain(size, 2.0) + root @ root.T
-    period, forgetting = 0.01, 4.0
+    period = 0.01
     new, gain = update(EXPONENTIAL, a, P, W, residual, forgetting, 1e9, period)
     fade = np.exp(-forgetting * period)
     weight = (1.0 - fade) / forgetting
