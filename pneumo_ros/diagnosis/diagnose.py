@@ -288,6 +288,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
             out |= {} if one.kept is None else {f"kept_{name}": one.kept}
     out |= {f"closes:{effect.family}": effect.closes for effect in outcome.closable.effects}
     out |= {f"at_bounds:{effect.family}": effect.at_bounds for effect in outcome.closable.effects}
+    out |= {f"instead:{one.family}": one.instead for one in outcome.closable.effects if one.instead < 1.0}
     out |= {f"follows:{one.family}": one.follows for one in outcome.closable.effects if np.isfinite(one.follows)}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 

@@ -74,6 +74,15 @@ class IsFollowed(Protocol):
 
 
 @runtime_checkable
+class ActsElsewhere(Protocol):
+    """An effect that looks like something at places where no family sits."""
+
+    @property
+    def elsewhere(self) -> tuple[str, ...]:
+        """Those places."""
+
+
+@runtime_checkable
 class HasLimits(Protocol):
     """A record that may forbid a verdict."""
 

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numba
 
-from pneumo_ros.effects import hooks, kernel
+from pneumo_ros.effects import hooks, kernel, oscillator
 from pneumo_ros.effects.cache import kept
 from pneumo_ros.plant import air_spring, half_car, orifice
 from pneumo_ros.rig import channels
@@ -61,8 +61,10 @@ class PlantTerm:
     tyre : (tyre, z, p) -> N, added to the tyre's force (positive upwards on the axle)
     air : (air, z, p) -> Pa/s, added to dP/dt
     supply : (z, p) -> Pa by which the supply has sagged; only for a term of the whole rig
-    shared : the term belongs to the rig, not to one end: advance is (z, air_front, air_rear, dt, p), start (air_front,
-        air_rear, p)
+    body : (strut_front, strut_rear, z, p) -> N upwards on the body alone above each axle; only for the whole rig
+    ground : (tyre_front, tyre_rear, z, p) -> N upwards on each axle, as a tyre's; only for the whole rig
+    shared : the term belongs to the rig, not to one end: advance is (z, front, rear, dt, p), start (front, rear, p),
+        of the struts for a term with ``body``, the tyres with ``ground``, else the air
     """
 
     states: int = 0
@@ -72,13 +74,22 @@ class PlantTerm:
     tyre: Compiled | None = None
     air: Compiled | None = None
     supply: Compiled | None = None
+    body: Compiled | None = None
+    ground: Compiled | None = None
     shared: bool = False
 
     @property
     def functions(self) -> dict[str, Compiled]:
         """Hook name -> function, of those it has."""
-        names = ("start", "advance", "force", "tyre", "air", "supply")
+        names = ("start", "advance", "force", "tyre", "air", "supply", "body", "ground")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    @property
+    def sees(self) -> tuple[str, ...]:
+        """Signals that its states follow: of its own end, or the one of both ends that a term of the whole rig sees."""
+        if not self.shared:
+            return ("strut", "air", "tyre")
+        return ("strut",) if self.body is not None else ("tyre",) if self.ground is not None else ("air",)
 
 
 @dataclass(frozen=True)
@@ -117,7 +128,7 @@ def _load(source: str, files: tuple[str, ...]) -> ModuleType:
 
 
 def _files(slots: Sequence[Slot]) -> list[str]:
-    modules = [hooks, kernel, channels, air_spring, half_car, orifice]
+    modules = [hooks, kernel, oscillator, channels, air_spring, half_car, orifice]
     functions = [f for slot in slots for f in slot.term.functions.values()]
     return sorted({str(m.__file__) for m in modules} | {inspect.getsourcefile(f.py_func) or "" for f in functions})
 
@@ -172,8 +183,9 @@ class _Place(NamedTuple):
         return f"{hook}_{self.k}({', '.join(arguments)})"
 
     def signals(self, *kinds: str) -> tuple[str, ...]:
-        """The signals of its end."""
-        return tuple(f"s.{kind}_{self.side}" for kind in kinds)
+        """The signals of its end, or of both for a term of the whole rig."""
+        sides = "fr" if self.slot.term.shared else self.side
+        return tuple(f"s.{kind}_{side}" for kind in kinds for side in sides)
 
 
 def _places(slots: Sequence[Slot]) -> list[_Place]:
@@ -225,9 +237,8 @@ def _changed(slots: Sequence[Slot], hook: str) -> str:
     lines = [f"{_tuple(p.z for p in places)} = z"] if places else []
     for p in places:
         if hook in p.slot.term.functions:
-            signals = ("s.air_f", "s.air_r") if p.slot.term.shared else p.signals("strut", "air", "tyre")
             before = (p.z,) if hook == "advance" else ()
-            call = p.call(hook, *before, *signals, *dt, f"p[{p.number}]")
+            call = p.call(hook, *before, *p.signals(*p.slot.term.sees), *dt, f"p[{p.number}]")
             lines += [f"if flags[{p.number}]:", f"    {p.z} = {call}"]
     name = {"start": "started(z, flags, p, s)", "advance": "advanced(z, flags, p, s, dt)"}[hook]
     return _function(name, [*lines, f"return {_tuple(p.z for p in places)}"])
@@ -245,6 +256,8 @@ def _sagged(slots: Sequence[Slot]) -> str:
 def _added(slots: Sequence[Slot]) -> str:
     """What terms add, by the hook's name: the signal it reads and the sum it enters."""
     targets = {"force": ("strut", "spring"), "tyre": ("tyre", "tyre"), "air": ("air", "air")}
+    # A spring's force acts on the body and back on the axle; what acts on the body alone is given to the axle again.
+    whole = {"body": ("strut", ("spring", "tyre")), "ground": ("tyre", ("tyre",))}
     sums = [f"{name}_{side}" for name in ("spring", "air", "tyre") for side in "fr"]
     lines = [f"{', '.join(sums)}, heave, pitch = loads"]
     for p in _places(slots):
@@ -252,4 +265,9 @@ def _added(slots: Sequence[Slot]) -> str:
             if hook in p.slot.term.functions:
                 call = p.call(hook, *p.signals(signal), f"z[{p.number}]", f"p[{p.number}]")
                 lines += [f"if flags[{p.number}]:", f"    {total}_{p.side} += {call}"]
+        for hook, (signal, totals) in whole.items():
+            if hook in p.slot.term.functions:
+                call = p.call(hook, *p.signals(signal), f"z[{p.number}]", f"p[{p.number}]")
+                lines += [f"if flags[{p.number}]:", f"    at_f, at_r = {call}"]
+                lines += [f"    {total}_{side} += at_{side}" for total in totals for side in "fr"]
     return _function("added(z, flags, p, s, loads)", [*lines, f"return Loads({', '.join(sums)}, heave, pitch)"])

@@ -87,6 +87,7 @@ class Effect:
     guide : what people want to know of it
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
+    elsewhere : places of no family where the same motion may come from: its name is held against what may act there
     follows : of a sensor's error, the least share of what is there that a reading of the kind still follows at either
         end of its range, 0 where it may stop
     """
@@ -106,6 +107,7 @@ class Effect:
     slot: str = ""
     columns: tuple[int, ...] = ()
     screened: tuple[int, ...] = ()
+    elsewhere: tuple[str, ...] = ()
     follows: float = 0.0
 
     @property

@@ -27,6 +27,7 @@ from pneumo_ros.units import GAS_CONSTANT
 THINNED = 8e-3  # s between rows that are evaluated
 BINS = 25
 STEP_TIME, STEP_ROWS = 0.3, 60  # s of a step response, and its points
+SWEPT = np.geomspace(1.0, 40.0, 100)  # Hz, of a frequency response
 DIFFERENCE = 1e-3  # of a typical value, for the band
 
 
@@ -107,6 +108,11 @@ TERMS: dict[str, tuple[Axis, Axis, Reader]] = {
     ),
 }  # fmt: skip
 TERMS["anything.tyre"], TERMS["anything.supply"] = TERMS["tyre_damping"], TERMS["supply_droop"]
+# What rings has no law over its own coordinate: the size of its answer to a motion, over frequency.
+RINGS = {
+    "anything.body": (Axis("frequency", "Hz"), Axis("apparent mass", "kg")),
+    "anything.ground": (Axis("frequency", "Hz"), Axis("ground's motion over the road's, axles held", "1")),
+}
 STEPS = ("valve_lag", "transport_delay", "exciter_lag", "pressure_lag")
 OPENINGS = ("valve_deadband", "anything.valve")
 
@@ -130,13 +136,16 @@ def curve_of(
     if family in TERMS:
         x, y, read = TERMS[family]
         rows = _rows(model, record, nuisance, active, own[0].site, family.endswith("supply_droop"))
-        shared = model.library[own[0].effect].term is not None and model.library[own[0].effect].term.shared  # type: ignore[union-attr]
-        found = lambda parts: read(rows.one, _along(model, parts, rows, shared))  # noqa: E731
+        found = lambda parts: read(rows.one, _along(model, parts, rows))  # noqa: E731
     elif family in STEPS:
         (x, y), found = STEP, lambda parts: _step_response(model, parts)
     elif family in OPENINGS:
         x, y = Axis("command", "m2"), Axis("opening", "m2")
         found = lambda parts: _openings(model, record, parts)  # noqa: E731
+    elif family in RINGS:
+        x, y = RINGS[family]
+        stiffness = model.plant(nuisance, active).body.tyre_stiffness_front
+        found = lambda parts: (SWEPT, ringing(parts[0], stiffness))  # noqa: E731
     elif outputs:
         unit = "m" if own[0].site.startswith(("sprung", "unsprung")) else "Pa"
         creeps = family.endswith("offset")  # a zero moves with time, a scale with what is read
@@ -145,16 +154,18 @@ def curve_of(
         found = lambda parts: _errors(model, record, parts, creeps)  # noqa: E731
     else:
         return None
-    return Curve(x, y, _banded(model, own, found, cov, step=family in STEPS))
+    return Curve(x, y, _banded(model, own, found, cov, each=family in STEPS or family in RINGS))
 
 
 def _banded(
     model: Running, own: Sequence[Active], found: Callable[[Sequence[Active]], tuple[Array, Array]], cov: Array,
-    step: bool,
+    each: bool,
 ) -> Array:  # fmt: skip
-    """(B, 5) binned curve with its 90 % band by linear propagation of the parameters' covariance."""
+    """(B, 5) binned curve with its 90 % band by linear propagation of the parameters' covariance; ``each`` point is a
+    bin of its own where the coordinate is none of the log's.
+    """
     x, y = found(own)
-    bins, centres, weight = _bins(x, step)
+    bins, centres, weight = _bins(x, each)
     mean = _binned(y, bins, len(centres))
     slopes = []
     for part, k, step_size in _moves(model, own):
@@ -175,8 +186,8 @@ def _moves(model: Running, own: Sequence[Active]) -> Iterator[tuple[int, int, fl
             yield part, k, size if active.values[k] + size <= p.high else -size
 
 
-def _bins(x: Array, step: bool) -> tuple[NDArray[np.intp], Array, Array]:
-    if step:
+def _bins(x: Array, each: bool) -> tuple[NDArray[np.intp], Array, Array]:
+    if each:
         return np.arange(len(x), dtype=np.intp), x, np.full(len(x), 1.0 / len(x))
     low, high = np.quantile(x, [0.002, 0.998])
     edges = np.linspace(low, max(high, low + 1e-12), BINS + 1)
@@ -241,12 +252,12 @@ def _row(
     return _Row(strut, air, tyre_of(top, axle, top_rate, axle_rate, inputs.road[i, end], slope, stiffness, load))
 
 
-def _along(model: Running, parts: Sequence[Active], run: _Run, shared: bool) -> Array:
+def _along(model: Running, parts: Sequence[Active], run: _Run) -> Array:
     """Output of the parts' terms along the run, summed."""
-    return np.sum([_term_along(model, part, run, shared) for part in parts], axis=0)
+    return np.sum([_term_along(model, part, run) for part in parts], axis=0)
 
 
-def _term_along(model: Running, part: Active, run: _Run, shared: bool) -> Array:
+def _term_along(model: Running, part: Active, run: _Run) -> Array:
     term = model.library[part.effect].term
     values = _values(model, part)
     if term is None or not any(part.values):
@@ -254,7 +265,7 @@ def _term_along(model: Running, part: Active, run: _Run, shared: bool) -> Array:
     z: Any = (0.0,) * term.states
     out = np.empty(len(run.one))
     for i, (one, other) in enumerate(zip(run.one, run.other, strict=True)):
-        seen = (one.air, other.air) if shared else (one.strut, one.air, one.tyre)
+        seen = (one.air, other.air) if term.shared else (one.strut, one.air, one.tyre)
         if i == 0 and term.start is not None:
             z = term.start(*seen, values)
         elif term.advance is not None:
@@ -297,6 +308,19 @@ def _step_response(model: Running, parts: Sequence[Active]) -> tuple[Array, Arra
             u = np.column_stack([acted.commands, acted.road])
     column = 4 if model.library[parts[0].effect].outputs is not None or "exciter" in parts[0].effect else 0
     return np.asarray(np.arange(STEP_ROWS) * period), u[4:, column]
+
+
+def ringing(part: Active, stiffness: float) -> Array:
+    """Size of the answer of :mod:`pneumo_ros.effects.shapes.outside` at SWEPT; ``stiffness`` of a tyre, N/m."""
+    size, frequency, damping_ratio, *more = part.values
+    s = 1j * SWEPT / frequency
+    answer = (1.0 + 2.0 * damping_ratio * s) / (s * s + 2.0 * damping_ratio * s + 1.0)
+    if part.effect == "anything.body":
+        return np.asarray(size * np.abs(answer))
+    # Both tyres press with their stiffness times the road's height where the axles are held.
+    return np.asarray(
+        np.abs(2.0 * size / (s * s + 2.0 * damping_ratio * s + 1.0) - more[0] / stiffness * (answer - 1.0))
+    )
 
 
 def _openings(model: Running, record: Drive, parts: Sequence[Active]) -> tuple[Array, Array]:

@@ -66,7 +66,8 @@ class Air(NamedTuple):
 
 class Tyre(NamedTuple):
     """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle),
-    middle m and its rate m/s as of the strut, compression at rest m."""
+    middle m and its rate m/s as of the strut, compression m and load N at rest, height of the road under it m and
+    its rate m/s."""
 
     compression: float
     rate: float
@@ -74,6 +75,9 @@ class Tyre(NamedTuple):
     middle: float
     middle_rate: float
     rest: float
+    load: float
+    road: float
+    slope: float
 
 
 @njit(cache=True, error_model="numpy")
@@ -118,8 +122,10 @@ def tyre_of(
     load: float,
 ) -> Tyre:
     """The nominal tyre below a strut."""
-    force, rest = stiffness * (road - axle), load / stiffness
-    return Tyre(road - axle, slope - axle_rate, force, 0.5 * (top + axle), 0.5 * (top_rate + axle_rate), rest)
+    middle, rate = 0.5 * (top + axle), 0.5 * (top_rate + axle_rate)
+    return Tyre(
+        road - axle, slope - axle_rate, stiffness * (road - axle), middle, rate, load / stiffness, load, road, slope
+    )
 
 
 @njit(cache=True, error_model="numpy")

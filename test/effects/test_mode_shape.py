@@ -21,7 +21,7 @@ def strut_at(middle: float, rate: float) -> Strut:
 def on_both(middle: float, rate: float, z: tuple[float, float], p: mode.Values) -> tuple[float, float]:
     """N upwards on body and axle: a strut pushes them apart, a tyre lifts the axle alone."""
     strut = mode.force(strut_at(middle, rate), z, p)
-    return strut, mode.tyre(Tyre(0.0, 0.0, 0.0, middle, rate, 0.02), z, p) - strut
+    return strut, mode.tyre(Tyre(0.0, 0.0, 0.0, middle, rate, 0.02, 300.0, 0.0, 0.0), z, p) - strut
 
 
 def test_at_rest_each_plate_carries_half_of_the_weight() -> None:
@@ -31,7 +31,7 @@ def test_at_rest_each_plate_carries_half_of_the_weight() -> None:
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_what_the_plates_feel_is_the_momentum_that_the_part_loses_but_for_the_grounds(share: float) -> None:
     p = (0.3, 12.0, 0.05, 0.0, share)
-    tyre = Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02)
+    tyre = Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0)
     shaken = 2.0 * math.pi * 4.0  # rad/s
     before, impulse = 0.01 * shaken, 0.0
     z = first = mode.start(strut_at(0.0, before), AIR, tyre, p)

@@ -57,7 +57,10 @@ def test_a_follower_has_a_lag_each_way_and_a_rate_limit() -> None:
 def test_an_exponent_lower_by_d_takes_its_share_of_the_squeeze() -> None:
     n, volume, pressure, rate = 1.4, 3e-4, 3e5, -1e-3
     gas = Air(pressure, 0.0457, rate, volume, 293.0, 0.0, 0.0, n, 293.0, 0.0, 6e5)
-    strut, tyre = Strut(0.0457, rate, 2e5, MEAN_AREA, 0.0, 0.0, 0.0), Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02)
+    strut, tyre = (
+        Strut(0.0457, rate, 2e5, MEAN_AREA, 0.0, 0.0, 0.0),
+        Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0),
+    )
     p = [0.0] * len(air.ATOMS)
     p[-2] = 0.2
     z = air.start(strut, gas, tyre, tuple(p))

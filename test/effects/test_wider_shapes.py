@@ -58,7 +58,9 @@ def test_a_tyre_that_only_pushes_is_a_lift_off_of_some_law(name: str, least: flo
     atoms = []
     for column in shape.columns:
         p = tuple(float(k == column) for k in range(len(tyres.ATOMS)))
-        seen = (Tyre(float(c), 0.0, STIFFNESS * float(c), 0.0, 0.0, REST) for c in compression)
+        seen = (
+            Tyre(float(c), 0.0, STIFFNESS * float(c), 0.0, 0.0, REST, STIFFNESS * REST, 0.0, 0.0) for c in compression
+        )
         atoms.append([tyres.tyre(one, (0.0, 0.0), p) for one in seen])
     (std,) = (one.std for one in RigModel(load_rig()).parameters if one.name == "tyre_stiffness_front")
     left = left_of(np.array(atoms).T, signs(shape), extra, compression[:, None], std)

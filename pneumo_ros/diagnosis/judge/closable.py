@@ -23,10 +23,11 @@ from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced, with_parts
 from pneumo_ros.diagnosis.search.screening import SENSOR
-from pneumo_ros.diagnosis.traits import IsFollowed
+from pneumo_ros.diagnosis.traits import ActsElsewhere, IsFollowed
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
+INSTEAD: Final = 30  # iterations of a fit with something of another kind in an effect's place [numerics]
 SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
@@ -132,6 +133,8 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     wheres = list(dict.fromkeys([*at.values(), *beyond]))
     added = problem.each(lambda where: _anything(problem, best, holdout, floor, where, left), wheres)
     remainders = dict(zip(wheres, added, strict=True))
+    elsewhere = [(law, place) for law in best.candidate.laws for place in _elsewhere(problem, law)]
+    instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
@@ -146,7 +149,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
         )  # fmt: skip
 
     evidence = problem.each(judged, best.candidate.laws)
-    found = sorted((r for r in remainders.values() if r.gap < own), key=lambda r: r.gap)
+    found = sorted((r for r in (*remainders.values(), *instead) if r.gap < own), key=lambda r: r.gap)
     if found and found[0].gap < (1.0 - WORTH) * own:
         evidence = problem.each(lambda one: _beside(problem, best, holdout, floor, one, found[0]), evidence)
     return Closable(tuple(evidence), tuple(found), own)
@@ -203,6 +206,22 @@ def _anything(
     found = with_parts(problem, best, parts, STEPS, _all(problem))
     total = held_by(problem, found, holdout).total
     return Remainder(where, parts, found, _above(total, floor), total)
+
+
+def _elsewhere(problem: Problem, law: Part) -> tuple[str, ...]:
+    """Places of no family where the same motion as an effect's may come from."""
+    effect = problem.model.effects[law[0]]
+    return effect.elsewhere if isinstance(effect, ActsElsewhere) else ()
+
+
+def _instead(problem: Problem, best: Fit, holdout: Any, floor: float, law: Part, place: str) -> Remainder:
+    """The structure with whatever may act at a place in place of one of its effects."""
+    model = problem.model
+    parts = model.anything_at(place) if isinstance(model, HasCeilings) else ()
+    bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
+    found = with_parts(problem, bare, parts, INSTEAD, _all(problem)) if parts else bare
+    total = held_by(problem, found, holdout).total
+    return Remainder((place,), parts, found, _above(total, floor), total)
 
 
 def _fitted(problem: Problem, one: Fit) -> Fit:

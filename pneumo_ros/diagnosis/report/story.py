@@ -38,6 +38,7 @@ from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
 OFTEN: Final = 0.05  # of the density where a log was most often, from which a measured law is told there [display]
+PEAK: Final = 1.5  # times either end, from which a measured law is told at its peak [display]
 MOVED: Final = 1.0  # tolerances from which a parameter of the rig is worth telling [display]
 
 
@@ -313,6 +314,11 @@ def why_not(summary: Mapping[str, Any]) -> str:
         if share is not None and float(share) < limits.closes:
             reasons.append(f"whatever may act at its place closes more: {effect_name(effect)} closes "
                            f"{percent(float(share))} of that, and half is needed")  # fmt: skip
+        instead = float(evidence.get(f"instead:{effect}", 1.0))
+        if instead < 1.0:
+            where = " and ".join(place_words(place) for place in (summary.get("remainder") or {}).get("places", ()))
+            reasons.append(f"whatever may act at {where or 'another place'} in place of {effect_name(effect)} leaves "
+                           f"{percent(instead)} of what it leaves")  # fmt: skip
         bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
         if bounded >= limits.at_bounds:
             reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
@@ -337,12 +343,16 @@ def measured(summary: Mapping[str, Any]) -> str:
 
 
 def _curve_words(curve: Mapping[str, Any]) -> str:
-    """A measured law at both ends of where the log was often: "force over rate: 2 N at -15 mm/s, -18 N at 13 mm/s"."""
+    """A measured law at both ends of where the log was often: "force over rate: 2 N at -15 mm/s, -18 N at 13 mm/s";
+    at its peak where it has one between them: "apparent mass over frequency: at most 12 kg at 5.9 Hz".
+    """
     points = np.asarray(curve["points"], dtype=float)
     often = points[points[:, 4] >= OFTEN * points[:, 4].max()] if points.shape[1] > 4 else points
     x, y = curve["x"], curve["y"]
     (along, x_factor), (up, y_factor) = (readable(axis["unit"], often[:, k]) for k, axis in enumerate((x, y)))
-    low, high = often[0, :2] * (x_factor, y_factor), often[-1, :2] * (x_factor, y_factor)
+    low, high, top = (often[k, :2] * (x_factor, y_factor) for k in (0, -1, int(np.argmax(often[:, 1]))))
+    if top[1] > PEAK * max(abs(low[1]), abs(high[1])):
+        return f"{y['name']} over {x['name']}: at most {top[1]:.3g} {up} at {top[0]:.3g} {along}"
     return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
             f"{high[1]:.3g} {up} at {high[0]:.3g} {along}")  # fmt: skip
 

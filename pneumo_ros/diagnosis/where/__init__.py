@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the gap lives: equation residuals in weak form, flexible corrections by place, regimes, conditional runs."""
+"""Where the half car's gap lives: equations in weak form, flexible corrections by place, regimes, conditional runs."""
 
 from pneumo_ros.diagnosis.where.conditional import conditional_gaps as conditional_gaps
 from pneumo_ros.diagnosis.where.corrected_run import place_gaps as place_gaps

@@ -18,6 +18,7 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.oscillator import swung
 from pneumo_ros.effects.parameters import EffectParameter
 
 State = tuple[float, float]
@@ -33,16 +34,7 @@ def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
 @njit(cache=True, error_model="numpy")
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
     """Exact damped oscillation about the strut that moves at held speed."""
-    w, zeta = 2.0 * math.pi * p[1], p[2]
-    decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
-    behind = -2.0 * zeta * p[3] * strut.rate / w  # of the strut, at constant speed
-    # The strut's position at the state's instant, half a step back: the staggered scheme's second order.
-    e0 = z[0] - (strut.height - 0.5 * dt * strut.rate) - behind
-    v0 = z[1] - strut.rate
-    c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
-    e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
-    v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
-    return (e1 + behind + strut.height + 0.5 * dt * strut.rate, v1 + strut.rate)
+    return swung(z[0], z[1], strut.height, strut.rate, 2.0 * math.pi * p[1], p[2], p[3], dt)
 
 
 @njit(cache=True, error_model="numpy")
@@ -57,6 +49,7 @@ EFFECT = Effect(
     summary="a resonance of the bellows' own mass inside the strut",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "road_input"),
     parameters=(
         EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True, meaning="mass of the part that swings"),
         EffectParameter(

@@ -4,24 +4,29 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import Effect
-from pneumo_ros.effects.shapes import air, body, force, mode, signals, supply, tyre
+from pneumo_ros.effects.shapes import air, body, force, mode, outside, signals, supply, tyre
 
 SHAPES: dict[str, Effect] = {
-    effect.id: effect for room in (body, force, mode, air, tyre, supply, signals) for effect in room.EFFECTS
+    effect.id: effect for room in (body, force, mode, air, tyre, supply, signals, outside) for effect in room.EFFECTS
 }
-# Place (its end, or its channel, as the site) -> what may act there.
+# Kind of place (its end as the site), or place of the whole rig -> what may act there.
 ANYTHING: dict[str, tuple[str, ...]] = {
     "force": ("anything.force",),
     "air": ("anything.air", "anything.valve"),
     "tyre": ("anything.tyre",),
     "supply": ("anything.supply",),
+    "body_heave": ("anything.body",),
+    "body_pitch": ("anything.body",),
+    "road_input": ("anything.ground",),
 }
 
 
 def anything_at(place: str) -> tuple[tuple[str, str], ...]:
-    """(effect, site) of what may act at a place of the contract; none where no term reaches (body, road)."""
+    """(effect, site) of what may act at a place of the contract; none at a place that is not known."""
     if place.startswith("sensor:"):
         channel = place.removeprefix("sensor:")
         return (("anything.pressure" if channel.endswith("pressure") else "anything.lvdt", channel),)
+    if place in ANYTHING:
+        return tuple((effect, "") for effect in ANYTHING[place])
     end, _, kind = place.rpartition("_")
     return tuple((effect, end) for effect in ANYTHING.get(kind, ()))

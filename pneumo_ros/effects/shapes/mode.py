@@ -19,6 +19,7 @@ from numba import njit
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.oscillator import swung
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
 
@@ -35,14 +36,7 @@ def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
 @njit(cache=True, error_model="numpy")
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
     """Exact damped oscillation about plates that move at held speed; half a step behind them, as every term."""
-    w, zeta = 2.0 * math.pi * p[1], p[2]
-    decay, wd = zeta * w, w * math.sqrt(1.0 - zeta * zeta)
-    behind = -2.0 * zeta * p[4] * strut.middle_rate / w  # of the plates, at constant speed
-    e0, v0 = z[0] - (strut.middle - 0.5 * dt * strut.middle_rate) - behind, z[1] - strut.middle_rate
-    c, s, fade = math.cos(wd * dt), math.sin(wd * dt), math.exp(-decay * dt)
-    e1 = fade * (e0 * c + (v0 + decay * e0) / wd * s)
-    v1 = fade * (v0 * c - (decay * v0 + w * w * e0) / wd * s)
-    return (e1 + behind + strut.middle + 0.5 * dt * strut.middle_rate, v1 + strut.middle_rate)
+    return swung(z[0], z[1], strut.middle, strut.middle_rate, 2.0 * math.pi * p[1], p[2], p[4], dt)
 
 
 @njit(cache=True, error_model="numpy", inline="always")

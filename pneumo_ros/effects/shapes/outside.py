@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What may ring where no family has a place: a part of the body, and the ground under the wheels.
+
+Both are no shapes of a family but ceilings: what a resonance of the bellows is held against, since a narrow answer of
+the rig to the road looks alike wherever it comes from.
+
+The body: a mass m hangs between the ends, its share s ahead, by q'' = w^2 (y - q) + 2 zeta w (y' - q') with y = s y_f +
+(1 - s) y_r of the body above the axles; it presses on the body there with -m q'' and with what it weighs. If it was
+part of the rigid body, that is lighter by it. The ground: it gives way to the tyres' forces F beyond those at rest by
+q_1'' = w^2 (F - q_1) - 2 zeta w q_1', and is shaken by what moves the road r by q_2'' = w^2 (r - q_2) + 2 zeta w
+(r' - q_2'); the tyres lose a q_1 and gain b (q_2 - r).
+
+Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from pneumo_ros.effects.composition import PlantTerm
+from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
+from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.oscillator import swung
+from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.shapes.atoms import SPREAD
+
+Swing = tuple[float, float]
+Shaken = tuple[float, float, float, float]
+FREQUENCY = EffectParameter("frequency", "Hz", 1.0, 40.0, 6.0, starts=(1.5, 2.5, 4.0, 9.0, 13.0, 20.0, 30.0))
+DAMPING_RATIO = EffectParameter("damping_ratio", "1", 0.005, 0.9, 0.1)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _hung(front: Strut, rear: Strut, ahead: float) -> Swing:
+    """Height and speed of the body where the mass hangs."""
+    top_f, top_r = front.middle + 0.5 * front.height, rear.middle + 0.5 * rear.height
+    rate_f, rate_r = front.middle_rate + 0.5 * front.rate, rear.middle_rate + 0.5 * rear.rate
+    return ahead * top_f + (1.0 - ahead) * top_r, ahead * rate_f + (1.0 - ahead) * rate_r
+
+
+@njit(cache=True, error_model="numpy")
+def start_swing(front: Strut, rear: Strut, p: Values) -> Swing:
+    """At rest on the body."""
+    return _hung(front, rear, p[3])
+
+
+@njit(cache=True, error_model="numpy")
+def swing(z: Swing, front: Strut, rear: Strut, dt: float, p: Values) -> Swing:
+    """The mass one step later."""
+    to, rate = _hung(front, rear, p[3])
+    return swung(z[0], z[1], to, rate, 2.0 * math.pi * p[1], p[2], 0.0, dt)
+
+
+@njit(cache=True, error_model="numpy")
+def on_body(front: Strut, rear: Strut, z: Swing, p: Values) -> tuple[float, float]:
+    """Spring, damper and weight, shared by the lever."""
+    to, rate = _hung(front, rear, p[3])
+    w = 2.0 * math.pi * p[1]
+    up = -p[0] * (w * w * (to - z[0]) + 2.0 * p[2] * w * (rate - z[1])) - p[4]
+    return p[3] * up, (1.0 - p[3]) * up
+
+
+def lightened(plant: Plant, ends: Ends, values: Values) -> Plant:
+    """The rigid rest of the body."""
+    mass = plant.body.sprung_mass
+    return plant._replace(body=plant.body._replace(sprung_mass=max(mass - values[5], 0.1 * mass)))
+
+
+@njit(cache=True, error_model="numpy")
+def start_shaken(front: Tyre, rear: Tyre, p: Values) -> Shaken:
+    """At rest under the load and the road of the first instant."""
+    return 0.0, 0.0, 0.5 * (front.road + rear.road), 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def shake(z: Shaken, front: Tyre, rear: Tyre, dt: float, p: Values) -> Shaken:
+    """The ground one step later."""
+    w = 2.0 * math.pi * p[1]
+    force = front.force - front.load + rear.force - rear.load
+    rate = front.rate * front.load / front.rest + rear.rate * rear.load / rear.rest
+    pressed = swung(z[0], z[1], force, rate, w, p[2], 1.0, dt)
+    moved = swung(z[2], z[3], 0.5 * (front.road + rear.road), 0.5 * (front.slope + rear.slope), w, p[2], 0.0, dt)
+    return pressed[0], pressed[1], moved[0], moved[1]
+
+
+@njit(cache=True, error_model="numpy")
+def on_axles(front: Tyre, rear: Tyre, z: Shaken, p: Values) -> tuple[float, float]:
+    """What ground that moves takes from each tyre's force."""
+    up = p[3] * (z[2] - 0.5 * (front.road + rear.road)) - p[0] * z[0]
+    return up, up
+
+
+EFFECTS = (
+    Effect(
+        id="anything.body",
+        summary="a part of the body that swings",
+        sites=RIG,
+        places=("body_heave", "body_pitch"),
+        parameters=(
+            EffectParameter("swinging_mass", "kg", 0.0, 20.0, 0.5, size=True, spread=SPREAD),
+            FREQUENCY,
+            DAMPING_RATIO,
+            EffectParameter("share_ahead", "1", -0.5, 1.5, 0.5),
+            EffectParameter("weight", "N", -50.0, 50.0, 2.0, size=True, spread=SPREAD),
+            EffectParameter("lighter", "kg", -5.0, 5.0, 0.2, size=True, spread=SPREAD),
+        ),
+        plant=lightened,
+        term=PlantTerm(states=2, start=start_swing, advance=swing, body=on_body, shared=True),
+    ),
+    Effect(
+        id="anything.ground",
+        summary="ground that gives way and rings",
+        sites=RIG,
+        places=("road_input",),
+        parameters=(
+            EffectParameter("giving", "1", 0.0, 1.0, 0.02, size=True, spread=SPREAD),
+            FREQUENCY,
+            DAMPING_RATIO,
+            EffectParameter("shaking", "N/m", -5e4, 5e4, 200.0, size=True, spread=SPREAD),
+        ),
+        term=PlantTerm(states=4, start=start_shaken, advance=shake, ground=on_axles, shared=True),
+    ),
+)
