@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -70,7 +71,9 @@ def diagnose(
                          remedy="leave it away to diagnose all")  # fmt: skip
     from pneumo_ros.cli.blind_work import diagnose_case
 
-    items = [(entry["name"], tuple(entry["withhold"]), str(folder), str(results)) for entry in entries]
+    # What the local processes leave of the cores helps each of them; of a cluster's computers nothing is known.
+    threads = 1 if scheduler else max(1, (os.cpu_count() or 1) // workers)
+    items = [(entry["name"], tuple(entry["withhold"]), str(folder), str(results), threads) for entry in entries]
     _run("diagnosing", diagnose_case, items, [entry["name"] for entry in entries], workers, scheduler)
 
 

@@ -19,15 +19,15 @@ def make_case(item: tuple[Planned, str]) -> None:
     made(case, Path(folder) / "cases", Path(folder) / "labels")
 
 
-def diagnose_case(item: tuple[str, tuple[str, ...], str, str]) -> None:
-    """Diagnose one case into ``<results>/<name>.json``; a finished one is kept."""
-    name, withhold, folder, results = item
+def diagnose_case(item: tuple[str, tuple[str, ...], str, str, int]) -> None:
+    """Diagnose one case by so many threads into ``<results>/<name>.json``; a finished one is kept."""
+    name, withhold, folder, results, threads = item
     target = Path(results) / f"{name}.json"
     if target.exists():
         return
     target.parent.mkdir(parents=True, exist_ok=True)
     began = time.perf_counter()
-    diagnosis = _diagnosis(Path(folder) / "cases" / name, withhold)
+    diagnosis = _diagnosis(Path(folder) / "cases" / name, withhold, threads)
     part = target.with_suffix(".part")
     content = {"diagnosis": diagnosis, "seconds": time.perf_counter() - began, "commit": _commit()}
     part.write_text(json.dumps(content, indent=1), "utf-8")
@@ -44,8 +44,10 @@ def _commit() -> str:
     return done.stdout.strip()
 
 
-def _diagnosis(case: Path, withhold: tuple[str, ...]) -> dict[str, object]:
+def _diagnosis(case: Path, withhold: tuple[str, ...], threads: int) -> dict[str, object]:
+    from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.diagnosis.half_car.from_logs import diagnose_files
 
-    found = diagnose_files([case / "fit.mcap"], case / "holdout.mcap", edit=case / "edit.mcap", without=list(withhold))
+    found = diagnose_files([case / "fit.mcap"], case / "holdout.mcap", edit=case / "edit.mcap", without=list(withhold),
+                           options=Options(threads=threads))  # fmt: skip
     return dict(found.to_json())

@@ -32,6 +32,7 @@ SLACK: Final = 0.03  # of what there was to close: what a law of the right kind 
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
 ENOUGH: Final = 20  # samples that have a slope [numerics]
+TRACE: Final = 0.05  # of the floor's mean square: a structure that leaves less leaves nothing [taste]
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -150,9 +151,17 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
 
     evidence = problem.each(judged, best.candidate.laws)
     found = sorted((r for r in (*remainders.values(), *instead) if r.gap < own), key=lambda r: r.gap)
-    if found and found[0].gap < (1.0 - WORTH) * own:
+    if found and worth_asking(found[0].gap, own, floor):
         evidence = problem.each(lambda one: _beside(problem, best, holdout, floor, one, found[0]), evidence)
     return Closable(tuple(evidence), tuple(found), own)
+
+
+def worth_asking(left: float, own: float, floor: float) -> bool:
+    """Whether so much less is left with something else than by the structure that a name may be the work of that.
+
+    ``left`` and ``own`` : mean squares of the held-out gap above the floor; ``floor`` : as the contract's gap
+    """
+    return left + TRACE * floor**2 < (1.0 - WORTH) * own
 
 
 def _followed(problem: Problem, holdout: Any, predicted: Array, law: Part, places: Sequence[str]) -> float:

@@ -163,8 +163,9 @@ def judge(
     scaled = {candidate: p * trusted for candidate, p in named.items()}
     scaled[refit.fit.candidate] += 1.0 - trusted - unknown
     acts = 1.0 - scaled[refit.fit.candidate]
-    effects = {one.law: told_probability(trust[one.law] * _in_structure(named, one.law), one.share, acts, calibration)
-               for one in evidence}  # fmt: skip
+    # What something elsewhere leaves less of acts as much less likely.
+    effects = {one.law: told_probability(trust[one.law] * _in_structure(named, one.law), one.share,
+                                         acts * min(1.0, one.instead), calibration) for one in evidence}  # fmt: skip
     names = sorted({family_of(law[0]) for law, value in trust.items() if value > 0.5})
     nameless = "unknown" if unknown >= scaled[refit.fit.candidate] else "none"
     return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
@@ -210,7 +211,7 @@ def told_probability(credited: float, share: float, acts: float, calibration: Ca
     ----------
     credited : probability by fit and held-out log
     share : of what the refit leaves, that the effect holds
-    acts : probability that anything acts at all
+    acts : probability that anything acts at all, and here
     """
     c = calibration
     slight = 1.0 / (1.0 + (max(share, 0.0) / c.slightly) ** 2)

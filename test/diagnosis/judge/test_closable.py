@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pneumo_ros.diagnosis.judge.closable import ENOUGH, followed
+from pneumo_ros.diagnosis.judge.closable import ENOUGH, followed, worth_asking
 from pneumo_ros.effects.parameters import STILL_FOLLOWS
 
 RNG = np.random.default_rng(5)
@@ -36,3 +36,10 @@ def test_a_curved_scale_still_follows() -> None:
 def test_too_few_samples_and_a_run_that_failed_say_nothing() -> None:
     assert followed(np.zeros(2 * ENOUGH - 1), np.arange(2.0 * ENOUGH - 1)) == 1.0
     assert followed(THERE, np.where(THERE > 4.2e5, np.nan, THERE)) == 1.0
+
+
+def test_a_structure_that_leaves_nothing_is_asked_for_nothing_else() -> None:
+    floor = 0.003
+    assert worth_asking(1e-5, 1e-4, floor)
+    assert not worth_asking(8e-5, 1e-4, floor)  # hardly less
+    assert not worth_asking(0.0, 0.06 * floor**2, floor)  # all of it is the floor's own uncertainty
