@@ -27,7 +27,7 @@ from pneumo_ros.units import GAS_CONSTANT
 THINNED = 8e-3  # s between rows that are evaluated
 BINS = 25
 STEP_TIME, STEP_ROWS = 0.3, 60  # s of a step response, and its points
-SWEPT = np.geomspace(1.0, 40.0, 100)  # Hz, of a frequency response
+SWEPT = np.geomspace(1.0, 40.0, 200)  # Hz, of a frequency response
 DIFFERENCE = 1e-3  # of a typical value, for the band
 
 

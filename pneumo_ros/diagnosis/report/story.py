@@ -344,7 +344,7 @@ def measured(summary: Mapping[str, Any]) -> str:
 
 def _curve_words(curve: Mapping[str, Any]) -> str:
     """A measured law at both ends of where the log was often: "force over rate: 2 N at -15 mm/s, -18 N at 13 mm/s";
-    at its peak where it has one between them: "apparent mass over frequency: at most 12 kg at 5.9 Hz".
+    at its peak where it has one between them: "apparent mass over frequency: 5 kg at 1 Hz, at most 62 kg at 5.9 Hz".
     """
     points = np.asarray(curve["points"], dtype=float)
     often = points[points[:, 4] >= OFTEN * points[:, 4].max()] if points.shape[1] > 4 else points
@@ -352,7 +352,8 @@ def _curve_words(curve: Mapping[str, Any]) -> str:
     (along, x_factor), (up, y_factor) = (readable(axis["unit"], often[:, k]) for k, axis in enumerate((x, y)))
     low, high, top = (often[k, :2] * (x_factor, y_factor) for k in (0, -1, int(np.argmax(often[:, 1]))))
     if top[1] > PEAK * max(abs(low[1]), abs(high[1])):
-        return f"{y['name']} over {x['name']}: at most {top[1]:.3g} {up} at {top[0]:.3g} {along}"
+        return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
+                f"at most {top[1]:.3g} {up} at {top[0]:.3g} {along}")  # fmt: skip
     return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
             f"{high[1]:.3g} {up} at {high[0]:.3g} {along}")  # fmt: skip
 

@@ -101,6 +101,17 @@ def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
     assert "force over height: -3 N at -10 mm, 5 N at 10 mm" in facts["measured"]
 
 
+def test_an_unknown_that_rings_says_where_how_and_what_its_name_leaves() -> None:
+    found = findings("unknown")
+    points = [[1.0, 5.0, 4.0, 6.0, 0.3], [5.9, 62.0, 60.0, 64.0, 0.3], [40.0, 0.6, 0.5, 0.7, 0.3]]
+    curve = {"x": {"name": "frequency", "unit": "Hz"}, "y": {"name": "apparent mass", "unit": "kg"}, "points": points}
+    rest = {"share": 0.02, "places": ["body_heave"], "curve": curve}
+    summary = {**found.summary, "evidence": {"closes:leak": 1.0, "instead:leak": 0.05}, "remainder": rest}
+    facts = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)
+    assert "at the body (up and down) in place of leak leaves 5 % of what it leaves" in facts["not it"]
+    assert "apparent mass over frequency: 5 kg at 1 Hz, at most 62 kg at 5.9 Hz" in facts["measured"]
+
+
 def test_what_became_of_an_effect_of_ones_own_is_told() -> None:
     known = Known(LIBRARY, own=("supply_droop", "mine", "leak"))
     summary = {**findings().summary, "tried": [{"candidate": "leak:front", "gap_fit": 0.01},
