@@ -25,7 +25,7 @@ rclpy.spin(node)
 """
 
 TALKER = """
-import json, os, signal, subprocess, sys, time
+import glob, json, os, signal, subprocess, sys, time
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
@@ -37,10 +37,12 @@ made = [node.create_publisher(String, topic, 10) for topic in ("/one", "/two")]
 while not all(one.get_subscription_count() for one in made):
     time.sleep(0.02)
 os.kill(listener, signal.SIGSTOP)
+while any(") T " not in open(path).read() for path in glob.glob(f"/proc/{listener}/task/*/stat")):
+    time.sleep(0.01)  # a thread that still runs would confirm
 for one in made:
     one.publish(String(data="the end"))
 began = time.monotonic()
-early = delivered(made, patience=0.5)
+early = delivered(made, patience=2.0)
 lost = time.monotonic() - began
 subprocess.Popen(["sh", "-c", f"sleep {held}; kill -CONT {listener}"])  # the wait holds this interpreter
 began = time.monotonic()
@@ -60,7 +62,7 @@ def test_a_subscriber_that_was_held_up_gets_the_last_message_once_it_goes_on() -
         listener.kill()
         listener.wait()
     early, lost, late, took = json.loads(done.stdout)
-    assert not early and 0.5 <= lost < 0.9, "the patience is for all publishers together"
+    assert not early and 2.0 <= lost < 3.9, f"the patience is for all publishers together, it took {lost} s"
     assert late and 2.5 <= took < 5.0, "with the middleware's own heartbeat it takes 6 s"
 
 

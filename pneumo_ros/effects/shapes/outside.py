@@ -34,7 +34,7 @@ DAMPING_RATIO = EffectParameter("damping_ratio", "1", 0.005, 0.9, 0.1)
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _hung(front: Strut, rear: Strut, ahead: float) -> Swing:
-    """Height and speed of the body where the mass hangs."""
+    """Height and speed of the body where the mass hangs; at ``ahead`` of 1 above the front axle, of 0 the rear."""
     top_f, top_r = front.middle + 0.5 * front.height, rear.middle + 0.5 * rear.height
     rate_f, rate_r = front.middle_rate + 0.5 * front.rate, rear.middle_rate + 0.5 * rear.rate
     return ahead * top_f + (1.0 - ahead) * top_r, ahead * rate_f + (1.0 - ahead) * rate_r
