@@ -75,11 +75,14 @@ class IsFollowed(Protocol):
 
 @runtime_checkable
 class ActsElsewhere(Protocol):
-    """An effect that looks like something at places where no family sits."""
+    """An effect whose motion may also come from places where no such effect sits."""
 
     @property
-    def elsewhere(self) -> tuple[str, ...]:
-        """Those places."""
+    def always(self) -> bool:
+        """Whether its name is held against those places however little the structure leaves."""
+
+    def elsewhere_of(self, site: str) -> tuple[tuple[str, ...], ...]:
+        """Sets of those places, for what acts at one site; each set could make its motion."""
 
 
 @runtime_checkable

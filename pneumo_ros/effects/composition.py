@@ -62,9 +62,10 @@ class PlantTerm:
     air : (air, z, p) -> Pa/s, added to dP/dt
     supply : (z, p) -> Pa by which the supply has sagged; only for a term of the whole rig
     body : (strut_front, strut_rear, z, p) -> N upwards on the body alone above each axle; only for the whole rig
+    struts : (strut_front, strut_rear, z, p) -> N added to each spring's force; only for the whole rig
     ground : (tyre_front, tyre_rear, z, p) -> N upwards on each axle, as a tyre's; only for the whole rig
     shared : the term belongs to the rig, not to one end: advance is (z, front, rear, dt, p), start (front, rear, p),
-        of the struts for a term with ``body``, the tyres with ``ground``, else the air
+        of the struts for a term with ``body`` or ``struts``, the tyres with ``ground``, else the air
     """
 
     states: int = 0
@@ -75,13 +76,14 @@ class PlantTerm:
     air: Compiled | None = None
     supply: Compiled | None = None
     body: Compiled | None = None
+    struts: Compiled | None = None
     ground: Compiled | None = None
     shared: bool = False
 
     @property
     def functions(self) -> dict[str, Compiled]:
         """Hook name -> function, of those it has."""
-        names = ("start", "advance", "force", "tyre", "air", "supply", "body", "ground")
+        names = ("start", "advance", "force", "tyre", "air", "supply", "body", "struts", "ground")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     @property
@@ -89,7 +91,9 @@ class PlantTerm:
         """Signals that its states follow: of its own end, or the one of both ends that a term of the whole rig sees."""
         if not self.shared:
             return ("strut", "air", "tyre")
-        return ("strut",) if self.body is not None else ("tyre",) if self.ground is not None else ("air",)
+        if self.body is not None or self.struts is not None:
+            return ("strut",)
+        return ("tyre",) if self.ground is not None else ("air",)
 
 
 @dataclass(frozen=True)
@@ -257,7 +261,11 @@ def _added(slots: Sequence[Slot]) -> str:
     """What terms add, by the hook's name: the signal it reads and the sum it enters."""
     targets = {"force": ("strut", "spring"), "tyre": ("tyre", "tyre"), "air": ("air", "air")}
     # A spring's force acts on the body and back on the axle; what acts on the body alone is given to the axle again.
-    whole = {"body": ("strut", ("spring", "tyre")), "ground": ("tyre", ("tyre",))}
+    whole = {
+        "body": ("strut", ("spring", "tyre")),
+        "struts": ("strut", ("spring",)),
+        "ground": ("tyre", ("tyre",)),
+    }
     sums = [f"{name}_{side}" for name in ("spring", "air", "tyre") for side in "fr"]
     lines = [f"{', '.join(sums)}, heave, pitch = loads"]
     for p in _places(slots):

@@ -87,7 +87,9 @@ class Effect:
     guide : what people want to know of it
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
-    elsewhere : places of no family where the same motion may come from: its name is held against what may act there
+    elsewhere : places, ``{end}`` as above, where the same motion may come from: its name is held against what may act
+        there in its stead; always where its motion tells nothing of the place (``always``), else where the structure
+        leaves much
     follows : of a sensor's error, the least share of what is there that a reading of the kind still follows at either
         end of its range, 0 where it may stop
     """
@@ -108,12 +110,18 @@ class Effect:
     columns: tuple[int, ...] = ()
     screened: tuple[int, ...] = ()
     elsewhere: tuple[str, ...] = ()
+    always: bool = False
     follows: float = 0.0
 
     @property
     def place_in_kernel(self) -> str:
         """Name of the kernel's slot that its term runs in: shapes of one place share one, their amplitudes add up."""
         return self.slot or self.id
+
+    def elsewhere_of(self, site: str) -> tuple[tuple[str, ...], ...]:
+        """The places elsewhere for what acts at one site, those of both ends together where it acts at both."""
+        ends = [end for end in ENDS[:2] if site in (end, "both", "") or f"_{end}" in site or f"{end}_" in site]
+        return tuple(tuple(dict.fromkeys(place.format(end=end) for end in ends)) for place in self.elsewhere)
 
     def __post_init__(self) -> None:
         check_places(self.sites, self.places)

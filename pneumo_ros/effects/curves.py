@@ -113,6 +113,14 @@ RINGS = {
     "anything.body": (Axis("frequency", "Hz"), Axis("apparent mass", "kg")),
     "anything.ground": (Axis("frequency", "Hz"), Axis("ground's motion over the road's, axles held", "1")),
 }
+# What ties the body or the struts: force over how far they have moved from where they began.
+TIES = {
+    "anything.held": (Axis("height of the body where it is held, from the begin", "m"), FORCE),
+    "anything.bar": (
+        Axis("height of the front spring over the rear one's, from the begin", "m"),
+        Axis("force on the front spring", "N"),
+    ),
+}  # fmt: skip
 STEPS = ("valve_lag", "transport_delay", "exciter_lag", "pressure_lag")
 OPENINGS = ("valve_deadband", "anything.valve")
 
@@ -142,6 +150,10 @@ def curve_of(
     elif family in OPENINGS:
         x, y = Axis("command", "m2"), Axis("opening", "m2")
         found = lambda parts: _openings(model, record, parts)  # noqa: E731
+    elif family in TIES:
+        x, y = TIES[family]
+        ends = _rows(model, record, nuisance, active, "front", False)
+        found = lambda parts: _tied(model, parts[0], ends)  # noqa: E731
     elif family in RINGS:
         x, y = RINGS[family]
         stiffness = model.plant(nuisance, active).body.tyre_stiffness_front
@@ -272,6 +284,19 @@ def _term_along(model: Running, part: Active, run: _Run) -> Array:
             z = term.advance(z, *seen, run.period, values)
         out[i] = _output(term, one, z, values)
     return out
+
+
+def _tied(model: Running, part: Active, run: _Run) -> tuple[Array, Array]:
+    """How far what is tied has moved, and its force: on the body, or on the front spring."""
+    term, values = model.library[part.effect].term, _values(model, part)
+    assert term is not None and term.start is not None
+    hook = term.body or term.struts
+    assert hook is not None
+    ends = [(front.strut, rear.strut) for front, rear in zip(run.one, run.other, strict=True)]
+    began = term.start(*ends[0], values)
+    moved = [term.start(*both, values)[0] - began[0] for both in ends]
+    forces = np.array([hook(*both, began, values) for both in ends])
+    return np.array(moved), forces.sum(axis=1) if term.body is not None else forces[:, 0]
 
 
 def _output(term: PlantTerm, row: _Row, z: Any, values: tuple[float, ...]) -> float:

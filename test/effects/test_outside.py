@@ -16,6 +16,7 @@ from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.shapes import outside
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.rig import load_rig
+from pneumo_ros.rig.channels import CHANNELS
 from pneumo_ros.units import GRAVITY
 
 STEP = 1e-4  # s
@@ -73,6 +74,29 @@ def test_ground_gives_way_to_a_lasting_force_and_follows_a_slow_road() -> None:
     assert outside.on_axles(pressed, still, z, p) == pytest.approx((-lost, -lost), rel=1e-3)
 
 
+def test_what_holds_the_body_pulls_it_back_to_where_it_began() -> None:
+    p = (400.0, 100.0, 7.0, 1.0, 0.002)
+    z = outside.start_held(strut_at(0.3, 0.0), strut_at(0.3, 0.0), p)
+    assert outside.hold(strut_at(0.302, 0.0), strut_at(0.3, 0.0), z, p) == pytest.approx((0.0, 0.0))
+    assert outside.hold(strut_at(0.312, 0.1), strut_at(0.3, 0.0), z, p) == pytest.approx((-4.0 - 0.7, 0.0))
+    assert outside.hold(strut_at(0.292, 0.0), strut_at(0.3, 0.0), z, p) == pytest.approx((1.0, 0.0))
+
+
+def test_a_bar_works_against_a_difference_of_heights_and_stores_what_it_takes() -> None:
+    log, model = signals_of(*simulated(seconds=3.0)), RigModel(load_rig())
+    p = (500.0, 0.0)
+    z = outside.start_tied(strut_at(0.3, 0.0), strut_at(0.29, 0.0), p)
+    assert outside.tie(strut_at(0.31, 0.0), strut_at(0.30, 0.0), z, p) == pytest.approx((0.0, 0.0))
+    assert outside.tie(strut_at(0.31, 0.0), strut_at(0.29, 0.0), z, p) == pytest.approx((-5.0, 5.0))
+    free, tied = (model.simulate(log, active=active) for active in ((), (Active("anything.bar", "", (1e5, 500.0)),)))
+    heights = [[CHANNELS.index(f"{part}_{end}") for part in ("sprung", "unsprung")] for end in ("front", "rear")]
+    moved = []
+    for run in (free, tied):
+        front, rear = (run[:, top] - run[:, axle] for top, axle in heights)
+        moved.append(np.std(front - rear))
+    assert moved[1] < 0.2 * moved[0], "a stiff bar keeps the struts alike"
+
+
 @pytest.mark.parametrize("place", ["body_heave", "body_pitch", "road_input"])
 def test_every_place_of_the_whole_rig_has_a_ceiling(place: str) -> None:
     found = anything_at(place)
@@ -95,3 +119,19 @@ def test_the_curve_of_ground_is_the_answer_that_its_states_give() -> None:
     late = np.array(moved[len(moved) // 2 :])
     answer = ringing(Active("anything.ground", "", p), STIFFNESS)[120]
     assert np.abs(late).max() / 0.01 == pytest.approx(answer, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    "part, stiffness",
+    [
+        (Active("anything.bar", "", (800.0, 0.0)), 800.0),
+        (Active("anything.held", "", (500.0, 500.0, 0.0, 0.5, 0.0)), 500.0),
+    ],
+)
+def test_the_curve_of_a_tie_is_its_stiffness(part: Active, stiffness: float) -> None:
+    log, model = signals_of(*simulated(seconds=3.0)), RigModel(load_rig())
+    nominal = np.array([p.nominal for p in model.parameters])
+    found = model.curve(log, nominal, [part], [part], np.zeros((len(part.values), len(part.values))))
+    assert found is not None and (found.x.unit, found.y.unit) == ("m", "N")
+    x, y = np.asarray(found.points).T[:2]
+    assert np.ptp(x) > 1e-3 and np.allclose(y, -stiffness * x, atol=1e-6)

@@ -12,6 +12,7 @@ from pneumo_ros.effects.shapes import air
 from pneumo_ros.effects.shapes.families import SHAPES
 from pneumo_ros.effects.shapes.signals import CREEPS, EXCITER_LAGS
 from pneumo_ros.plant.air_spring import MEAN_AREA
+from pneumo_ros.units import GAS_CONSTANT
 
 PERIOD = 2e-3  # s
 ROWS = 4000
@@ -62,7 +63,24 @@ def test_an_exponent_lower_by_d_takes_its_share_of_the_squeeze() -> None:
         Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0),
     )
     p = [0.0] * len(air.ATOMS)
-    p[-2] = 0.2
+    p[[atom.name for atom in air.ATOMS].index("exponent 0.05 m/s")] = 0.2
     z = air.start(strut, gas, tyre, tuple(p))
     squeeze = -pressure * MEAN_AREA * rate / volume  # Pa/s for each unit of the exponent
     assert air.air(gas, z, tuple(p)) == pytest.approx(-0.2 * squeeze, rel=1e-3)
+
+
+def test_an_outlet_that_ices_lets_out_less_the_longer_it_lasts() -> None:
+    flow = 1e-3
+    gas = Air(3e5, 0.0457, 0.0, 3e-4, 293.0, 0.0, flow, 1.4, 293.0, 0.0, 6e5)
+    strut, tyre = (
+        Strut(0.0457, 0.0, 2e5, MEAN_AREA, 0.0, 0.0, 0.0),
+        Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0),
+    )
+    p = [0.0] * len(air.ATOMS)
+    p[[atom.name for atom in air.ATOMS].index("later outlet 3 s")] = -0.3
+    z, seen = air.start(strut, gas, tyre, tuple(p)), []
+    for step in range(3001):
+        if step in (0, 3000):
+            seen.append(air.air(gas, z, tuple(p)) * gas.volume / (1.4 * GAS_CONSTANT * 293.0) / flow)
+        z = air.advance(z, strut, gas, tyre, 1e-3, tuple(p))
+    assert seen == pytest.approx([0.0, 0.3 * (1.0 - np.exp(-1.0))], abs=1e-9)  # share of the outflow that stays

@@ -73,14 +73,16 @@ def measured_curve(
     """Curve of an effect's parts in a fitted structure with its 90 % band: what the covariance of its scaled unknowns
     gives, and ``form`` of the curve's own rms, because what is left may be this law's.
 
-    Of whatever may act at several places that of the first: a force and a flow have no curve together.
+    Of whatever may act at several places, or in several ways at one, that which is used most, in typical amplitudes: a
+    force and a flow have no curve together.
     """
     model = problem.model
     if not isinstance(model, HasCurves) or not parts:
         return None
-    if family_of(parts[0][0]) == ANYTHING:
-        parts = parts[:1]
     active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+    if family_of(parts[0][0]) == ANYTHING:
+        used = {part: _used(problem, it) for part, it in zip(one.candidate.parts, active, strict=True)}
+        parts = [max(parts, key=used.__getitem__)]
     own: list[Active] = []
     columns: list[int] = []
     first = problem.fixed
@@ -94,6 +96,12 @@ def measured_curve(
     known = cov[np.ix_(columns, columns)] * np.outer(size, size)
     found = model.curve(record, problem.nuisance(one.x), active, own, known)
     return None if found is None else _widened(found, form)
+
+
+def _used(problem: Problem, acting: Active) -> float:
+    """Largest amplitude of an effect, in typical ones."""
+    parameters = problem.model.effects[acting.effect].parameters
+    return max(abs(value) / p.typical for p, value in zip(parameters, acting.values, strict=True) if p.size)
 
 
 def _widened(curve: Curve, form: float) -> Curve:

@@ -33,6 +33,8 @@ WORTH: Final = 0.3  # share of what is left that a place must close to be called
 END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
 ENOUGH: Final = 20  # samples that have a slope [numerics]
 TRACE: Final = 0.05  # of the floor's mean square: a structure that leaves less leaves nothing [taste]
+# Share (rms) of the refit's gap, both above the floor, from which on a structure leaves much [taste]
+LEFT: Final = 0.08
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -115,7 +117,7 @@ class Closable:
     own: float = 0.0
 
 
-def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Sequence[str]) -> Closable:
+def closable(problem: Problem, best: Fit, holdout: Any, floor: float, refit: float, places: Sequence[str]) -> Closable:
     """Judge the best structure's effects against what is closable at their places and elsewhere.
 
     Parameters
@@ -123,6 +125,7 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     problem, best : the structure, fitted to all blocks
     holdout : the held-out record
     floor : gap that sensors and the model's stated form leave, as the contract's gap
+    refit : held-out gap of the refit, as the contract's
     places : further places of the contract where something may be missing, the likeliest first
     """
     left = held_by(problem, best, holdout).total
@@ -134,7 +137,8 @@ def closable(problem: Problem, best: Fit, holdout: Any, floor: float, places: Se
     wheres = list(dict.fromkeys([*at.values(), *beyond]))
     added = problem.each(lambda where: _anything(problem, best, holdout, floor, where, left), wheres)
     remainders = dict(zip(wheres, added, strict=True))
-    elsewhere = [(law, place) for law in best.candidate.laws for place in _elsewhere(problem, law)]
+    much = own > LEFT**2 * _above(refit, floor)
+    elsewhere = [(law, places) for law in best.candidate.laws for places in _elsewhere(problem, law, much)]
     instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
 
     def judged(law: Part) -> EffectEvidence:
@@ -207,9 +211,7 @@ def _anything(
     problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], left: float
 ) -> Remainder:
     """The structure with whatever may act at some places; ``left`` is its own held-out gap."""
-    model = problem.model
-    at = [model.anything_at(place) for place in where] if isinstance(model, HasCeilings) else []
-    parts = tuple(dict.fromkeys(part for parts in at for part in parts))
+    parts = _whatever(problem, where)
     if not parts:
         return Remainder(where, (), best, _above(left, floor), left)
     found = with_parts(problem, best, parts, STEPS, _all(problem))
@@ -217,20 +219,31 @@ def _anything(
     return Remainder(where, parts, found, _above(total, floor), total)
 
 
-def _elsewhere(problem: Problem, law: Part) -> tuple[str, ...]:
-    """Places of no family where the same motion as an effect's may come from."""
+def _elsewhere(problem: Problem, law: Part, much: bool) -> tuple[tuple[str, ...], ...]:
+    """Sets of places where the same motion as an effect's may come from.
+
+    ``much`` : the structure leaves much of the gap
+    """
     effect = problem.model.effects[law[0]]
-    return effect.elsewhere if isinstance(effect, ActsElsewhere) else ()
+    if not isinstance(effect, ActsElsewhere) or not (much or effect.always):
+        return ()
+    return effect.elsewhere_of(law[1])
 
 
-def _instead(problem: Problem, best: Fit, holdout: Any, floor: float, law: Part, place: str) -> Remainder:
-    """The structure with whatever may act at a place in place of one of its effects."""
-    model = problem.model
-    parts = model.anything_at(place) if isinstance(model, HasCeilings) else ()
+def _instead(problem: Problem, best: Fit, holdout: Any, floor: float, law: Part, where: tuple[str, ...]) -> Remainder:
+    """The structure with whatever may act at some places in place of one of its effects."""
+    parts = _whatever(problem, where)
     bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
     found = with_parts(problem, bare, parts, INSTEAD, _all(problem)) if parts else bare
     total = held_by(problem, found, holdout).total
-    return Remainder((place,), parts, found, _above(total, floor), total)
+    return Remainder(where, parts, found, _above(total, floor), total)
+
+
+def _whatever(problem: Problem, where: tuple[str, ...]) -> tuple[Part, ...]:
+    """What may act at some places."""
+    model = problem.model
+    at = [model.anything_at(place) for place in where] if isinstance(model, HasCeilings) else []
+    return tuple(dict.fromkeys(part for parts in at for part in parts))
 
 
 def _fitted(problem: Problem, one: Fit) -> Fit:

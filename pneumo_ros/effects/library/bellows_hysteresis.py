@@ -46,6 +46,7 @@ EFFECT = Effect(
     summary="the bellows' rubber loses energy by travel, not by speed",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "hysteresis_force",

@@ -50,6 +50,7 @@ EFFECT = Effect(
     sites=ENDS,
     places=("{end}_force",),
     elsewhere=("body_heave", "road_input"),
+    always=True,
     parameters=(
         EffectParameter("mode_mass", "kg", 0.0, 2.0, 0.15, size=True, meaning="mass of the part that swings"),
         EffectParameter(

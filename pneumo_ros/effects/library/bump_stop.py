@@ -32,6 +32,7 @@ EFFECT = Effect(
     summary="the bump stop acts earlier or harder than modelled",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "stop_stiffness", "N/m", 0.0, 1e6, 2e4, size=True, starts=(1e5,), meaning="stiffness at the first touch"

@@ -54,6 +54,7 @@ EFFECT = Effect(
     summary="dry friction between body and axle (bushing, guide), with presliding and a Stribeck peak",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "friction_force",

@@ -30,6 +30,7 @@ EFFECT = Effect(
     summary="the effective area surface is off by a factor, or leans over height",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "area_error",

@@ -25,6 +25,7 @@ EFFECT = Effect(
     summary="a pressure sensor reports late",
     sites=PRESSURES_OR_BOTH,
     places=(),
+    elsewhere=("{end}_air",),
     parameters=(
         EffectParameter(
             "sensor_lag", "s", 0.0, 0.2, 0.005, size=True, starts=(0.02,), meaning="time constant of sensor and tube"

@@ -13,6 +13,7 @@ EFFECT = Effect(
     summary="a pressure sensor's zero is off",
     sites=PRESSURES_OR_BOTH,
     places=(),
+    elsewhere=("{end}_air",),
     parameters=(EffectParameter("offset", "Pa", -6e4, 6e4, 2e3, size=True, meaning="what the sensor reads too much"),),
     outputs=shifted,
     undo=unshifted,

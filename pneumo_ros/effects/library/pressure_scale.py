@@ -31,6 +31,7 @@ EFFECT = Effect(
     summary="a pressure sensor's sensitivity is off",
     sites=PRESSURES_OR_BOTH,
     places=(),
+    elsewhere=("{end}_air",),
     parameters=(
         EffectParameter("scale_error", "1", -0.5, 0.5, 0.03, size=True, meaning="error of the sensitivity, as a share"),
         EffectParameter(

@@ -26,6 +26,7 @@ EFFECT = Effect(
     summary="viscous damping of the tyre",
     sites=ENDS,
     places=("{end}_tyre",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "tyre_damping", "N s/m", 0.0, 500.0, 20.0, size=True, meaning="force of the rubber for each m/s"

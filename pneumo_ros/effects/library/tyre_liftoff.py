@@ -26,6 +26,7 @@ EFFECT = Effect(
     summary="the wheel leaves the ground: no pull from the tyre",
     sites=ENDS,
     places=("{end}_tyre",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "lost_pull",

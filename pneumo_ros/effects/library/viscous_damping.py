@@ -28,6 +28,7 @@ EFFECT = Effect(
     summary="viscous damping of the strut beyond its tolerance",
     sites=ENDS,
     places=("{end}_force",),
+    elsewhere=("body_heave", "body_pitch"),
     parameters=(
         EffectParameter(
             "added_damping",

@@ -2,7 +2,8 @@
 """Atoms of a spring's air balance: leaks, errors of the orifices, heat from the wall, volume that is not V(h).
 
 A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q; an exponent n - D for slow strokes is
-a heat of D/(n - 1) P dV/dt (Quaglia and Sorli 2001).
+a heat of D/(n - 1) P dV/dt (Quaglia and Sorli 2001). An orifice that ices or clogs passes a share of its flow less, the
+more the longer the session lasts.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -29,6 +30,7 @@ SWING = 5e-3  # m
 HEAT_CAPACITY = 1005.0  # J/(kg K), of air at constant pressure
 SLOW = (0.05, 0.2)  # m/s, rates of the strut below which the exponent is lower
 MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
+SETTLES = (3.0, 12.0)  # s after a session's begin in which an orifice changes, as by ice
 
 ATOMS = (
     Atom("leak hole", "m2", 2e-7),
@@ -48,8 +50,9 @@ ATOMS = (
     Atom("volume over pressure", "1", 0.03, signed=True),
     Atom("constant", "kg/s", 3e-5, signed=True),
     *(Atom(f"exponent {v:g} m/s", "1", 0.03) for v in SLOW),
+    *(Atom(f"later {where} {t:g} s", "1", 0.05) for where in ("outlet", "inlet") for t in SETTLES),
 )
-State = tuple[float, float, float, float]
+State = tuple[float, float, float, float, float, float]
 Values = tuple[float, ...]
 # A shape is no law whose last digit means anything: sums in any order, divisors turned over once, half the time.
 LOOSE = {"arcp", "contract", "reassoc"}
@@ -57,18 +60,19 @@ LOOSE = {"arcp", "contract", "reassoc"}
 
 @njit(cache=True, error_model="numpy")
 def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
-    """Air and wall at the supply's temperature."""
+    """Air and wall at the supply's temperature, orifices as they were."""
     t = air.temperature
-    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t)
+    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t, 0.0, 0.0)
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
-    """The air's mass by its flows, and the walls that follow its temperature."""
+    """The air's mass by its flows, the walls that follow its temperature, and orifices that change with time."""
     t = air.temperature
     return (
         max(z[0] + dt * (air.inflow - air.outflow), 1e-7), t + (z[1] - t) * math.exp(-dt / MEMORIES[0]),
         t + (z[2] - t) * math.exp(-dt / MEMORIES[1]), t + (z[3] - t) * math.exp(-dt / MEMORIES[2]),
+        1.0 + (z[4] - 1.0) * math.exp(-dt / SETTLES[0]), 1.0 + (z[5] - 1.0) * math.exp(-dt / SETTLES[1]),
     )  # fmt: skip
 
 
@@ -82,7 +86,7 @@ def air(air: Air, z: State, p: Values) -> float:
     leak += p[2] * max(0.0, air.pressure - 2.5e5) / 1e5 + p[3] * max(0.0, air.pressure - 3.5e5) / 1e5
     flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
     flow -= air.outflow * (p[7] + p[8] * (ATMOSPHERE / air.pressure - 0.5)) + leak * air.escape
-    flow += p[18]
+    flow += p[18] + air.inflow * (p[23] * z[4] + p[24] * z[5]) - air.outflow * (p[21] * z[4] + p[22] * z[5])
     true = air.pressure * air.volume / (GAS_CONSTANT * z[0])
     heat = (p[9] + p[10] * pressure) * (air.supply_temperature - true)
     heat += p[11] * (z[1] - t) + p[12] * (z[2] - t) + p[13] * (z[3] - t)
@@ -95,7 +99,7 @@ def air(air: Air, z: State, p: Values) -> float:
     return (air.exponent * through * flow + (air.exponent - 1.0) * heat) / air.volume - extra * nominal
 
 
-AIR = Term("air", PlantTerm(states=4, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
+AIR = Term("air", PlantTerm(states=6, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
     AIR.shape("leak", ["leak"], "a leak of any law: grows with the pressure"),
     AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),

@@ -15,8 +15,8 @@ ANYTHING: dict[str, tuple[str, ...]] = {
     "air": ("anything.air", "anything.valve"),
     "tyre": ("anything.tyre",),
     "supply": ("anything.supply",),
-    "body_heave": ("anything.body",),
-    "body_pitch": ("anything.body",),
+    "body_heave": ("anything.body", "anything.held"),
+    "body_pitch": ("anything.body", "anything.bar"),
     "road_input": ("anything.ground",),
 }
 

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What may ring where no family has a place: a part of the body, and the ground under the wheels.
+"""What may act where no family has a place: at the body, between the struts, and in the ground under the wheels.
 
-Both are no shapes of a family but ceilings: what a resonance of the bellows is held against, since a narrow answer of
-the rig to the road looks alike wherever it comes from.
+These are no shapes of a family but ceilings: what a name is held against whose motion may also come from there, as a
+narrow answer of the rig to the road looks alike wherever it rings.
 
 The body: a mass m hangs between the ends, its share s ahead, by q'' = w^2 (y - q) + 2 zeta w (y' - q') with y = s y_f +
 (1 - s) y_r of the body above the axles; it presses on the body there with -m q'' and with what it weighs. If it was
 part of the rigid body, that is lighter by it. The ground: it gives way to the tyres' forces F beyond those at rest by
 q_1'' = w^2 (F - q_1) - 2 zeta w q_1', and is shaken by what moves the road r by q_2'' = w^2 (r - q_2) + 2 zeta w
 (r' - q_2'); the tyres lose a q_1 and gain b (q_2 - r).
+
+What holds the body from outside, a cable or a guide, pulls with k_+ or k_- at its point above or below a height y_0,
+and with c y'. A bar between the struts gives the front spring -k (h_f - h_r - d) and the rear one as much upwards,
+where d is the difference of heights at the first instant.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -92,6 +96,40 @@ def on_axles(front: Tyre, rear: Tyre, z: Shaken, p: Values) -> tuple[float, floa
     return up, up
 
 
+@njit(cache=True, error_model="numpy")
+def start_held(front: Strut, rear: Strut, p: Values) -> tuple[float]:
+    """Height of the point that is held at the first instant."""
+    return (_hung(front, rear, p[3])[0],)
+
+
+@njit(cache=True, error_model="numpy")
+def kept(z: tuple[float], front: Strut, rear: Strut, dt: float, p: Values) -> tuple[float]:
+    """Nothing is forgotten."""
+    return z
+
+
+@njit(cache=True, error_model="numpy")
+def hold(front: Strut, rear: Strut, z: tuple[float], p: Values) -> tuple[float, float]:
+    """Upwards on the body, shared by the lever."""
+    to, rate = _hung(front, rear, p[3])
+    lifted = to - z[0] - p[4]
+    up = -p[0] * max(0.0, lifted) - p[1] * min(0.0, lifted) - p[2] * rate
+    return p[3] * up, (1.0 - p[3]) * up
+
+
+@njit(cache=True, error_model="numpy")
+def start_tied(front: Strut, rear: Strut, p: Values) -> tuple[float]:
+    """Difference of the struts' heights at the first instant."""
+    return (front.height - rear.height,)
+
+
+@njit(cache=True, error_model="numpy")
+def tie(front: Strut, rear: Strut, z: tuple[float], p: Values) -> tuple[float, float]:
+    """A bar's force on both springs."""
+    pull = p[0] * (front.height - rear.height - z[0]) + p[1] * (front.rate - rear.rate)
+    return -pull, pull
+
+
 EFFECTS = (
     Effect(
         id="anything.body",
@@ -121,5 +159,30 @@ EFFECTS = (
             EffectParameter("shaking", "N/m", -5e4, 5e4, 200.0, size=True, spread=SPREAD),
         ),
         term=PlantTerm(states=4, start=start_shaken, advance=shake, ground=on_axles, shared=True),
+    ),
+    Effect(
+        id="anything.held",
+        summary="something outside that holds the body",
+        sites=RIG,
+        places=("body_heave",),
+        parameters=(
+            EffectParameter("pull", "N/m", -2e4, 2e4, 300.0, size=True, spread=SPREAD),
+            EffectParameter("push", "N/m", -2e4, 2e4, 300.0, size=True, spread=SPREAD),
+            EffectParameter("drag", "N s/m", -500.0, 500.0, 5.0, size=True, spread=SPREAD),
+            EffectParameter("share_ahead", "1", -0.5, 1.5, 0.5),
+            EffectParameter("begins", "m", -0.02, 0.02, 0.001),
+        ),
+        term=PlantTerm(states=1, start=start_held, advance=kept, body=hold, shared=True),
+    ),
+    Effect(
+        id="anything.bar",
+        summary="a bar between the struts",
+        sites=RIG,
+        places=("body_pitch",),
+        parameters=(
+            EffectParameter("bar", "N/m", -2e4, 2e4, 300.0, size=True, spread=SPREAD),
+            EffectParameter("bar_damping", "N s/m", -500.0, 500.0, 5.0, size=True, spread=SPREAD),
+        ),
+        term=PlantTerm(states=1, start=start_tied, advance=kept, struts=tie, shared=True),
     ),
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A resonance looks alike wherever it comes from: the name of the bellows is held against body and ground."""
+"""What looks alike comes from elsewhere: names are held against whatever may act at body, struts, ground and air."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.own_logs import drawn, log
 
-from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
 from pneumo_ros.diagnosis.judge.closable import Closable, closable
 from pneumo_ros.diagnosis.judge.held_out import total_floor
@@ -20,6 +20,7 @@ from pneumo_ros.rig import load_rig
 
 BELLOWS = ("bellows_mode", "both")
 FREQUENCY = 5.9  # Hz, of all three
+RESONANCE = (0.15, FREQUENCY, 0.08, 0.5)
 
 
 @pytest.fixture(scope="module")
@@ -27,15 +28,17 @@ def model() -> RigModel:
     return RigModel(load_rig())
 
 
-def called_the_bellows(model: RigModel, truth: Active) -> Closable:
-    """What is closable beside and instead of a resonance of the bellows, fitted to a rig that has ``truth``."""
+def called(model: RigModel, truth: Active, name: Part, start: tuple[float, ...], refit: float = 0.0) -> Closable:
+    """What is closable beside and instead of a named effect, fitted from ``start`` to a rig that has ``truth``; with no
+    gap of the refit whatever the structure leaves is much.
+    """
     nuisance = drawn(model, 8)
     records = [log(model, seed, nuisance, (truth,)) for seed in (1, 2)]
     problem = Problem(model, (records[0],))
-    candidate = Candidate((BELLOWS,))
-    start = problem.start(candidate, np.zeros(problem.fixed), [0.15, FREQUENCY, 0.08, 0.5])
-    best = fit(problem, candidate, start, rows=np.ones(len(problem.measured), dtype=bool), iterations=20)
-    return closable(problem, best, records[1], total_floor(records[1]), [])
+    candidate = Candidate((name,))
+    x = problem.start(candidate, np.zeros(problem.fixed), list(start))
+    best = fit(problem, candidate, x, rows=np.ones(len(problem.measured), dtype=bool), iterations=20)
+    return closable(problem, best, records[1], total_floor(records[1]), refit, [])
 
 
 def likely(found: Closable) -> float:
@@ -53,7 +56,7 @@ def likely(found: Closable) -> float:
     ids=["body", "ground"],
 )
 def test_what_rings_elsewhere_takes_the_name(model: RigModel, truth: Active, place: str) -> None:
-    found = called_the_bellows(model, truth)
+    found = called(model, truth, BELLOWS, RESONANCE)
     assert found.remainders[0].places == (place,)
     assert found.effects[0].instead < 0.5 and found.effects[0].beside < 0.2
     assert likely(found) < 0.05
@@ -63,5 +66,43 @@ def test_what_rings_elsewhere_takes_the_name(model: RigModel, truth: Active, pla
 
 @pytest.mark.slow
 def test_a_resonance_of_the_bellows_keeps_its_name(model: RigModel) -> None:
-    found = called_the_bellows(model, Active("bellows_mode", "both", (0.4, FREQUENCY, 0.08, 0.5)))
+    found = called(model, Active("bellows_mode", "both", (0.4, FREQUENCY, 0.08, 0.5)), BELLOWS, RESONANCE)
     assert likely(found) > 0.9
+
+
+def icing(model: RigModel, share: float) -> tuple[float, ...]:
+    """Atoms of a spring's air of which one is not zero: an outlet that closes within some seconds."""
+    names = [p.name for p in model.effects["anything.air"].parameters]
+    return tuple(share if name == "later outlet 3 s" else 0.0 for name in names)
+
+
+@pytest.mark.slow
+def test_a_bar_between_the_struts_is_no_stop(model: RigModel) -> None:
+    stop = model.effects["bump_stop"].parameters
+    found = called(model, Active("anything.bar", "", (3000.0, 0.0)), ("bump_stop", "both"),
+                   tuple(p.typical for p in stop))  # fmt: skip
+    assert found.remainders[0].places == ("body_pitch",)
+    assert likely(found) < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("site, places", [("rear_pressure", ("rear_air",)), ("both", ("front_air", "rear_air"))])
+def test_an_outlet_that_ices_is_no_sensor_that_is_off(model: RigModel, site: str, places: tuple[str, ...]) -> None:
+    at = "rear" if site == "rear_pressure" else "both"
+    found = called(model, Active("anything.air", at, icing(model, -0.05)), ("pressure_offset", site), (2e3,))
+    assert found.remainders[0].places == places
+    assert likely(found) < 0.05
+
+
+@pytest.mark.slow
+def test_a_sensor_that_is_off_keeps_its_name(model: RigModel) -> None:
+    name = ("pressure_offset", "rear_pressure")
+    assert likely(called(model, Active(*name, (4e3,)), name, (2e3,))) > 0.9
+
+
+def test_another_place_is_asked_only_where_much_is_left(model: RigModel) -> None:
+    truth = Active("anything.bar", "", (300.0, 0.0))
+    start = tuple(p.typical for p in model.effects["bump_stop"].parameters)
+    asked, not_asked = (called(model, truth, ("bump_stop", "both"), start, refit) for refit in (0.0, 1e3))
+    assert ("body_pitch",) in {one.places for one in asked.remainders}
+    assert ("body_pitch",) not in {one.places for one in not_asked.remainders}
