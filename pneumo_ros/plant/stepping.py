@@ -30,7 +30,7 @@ class SteppedRig(Protocol):
         """What the sensors show without noise, (6,) of :data:`pneumo_ros.rig.channels.CHANNELS`."""
 
     def plant_state(self, state: Any) -> Array:
-        """(10,) of :mod:`pneumo_ros.plant.half_car`."""
+        """(10,) of :mod:`pneumo_ros.plant.equations`."""
 
     def truth(self, state: Any, command: Array, road: Array) -> Array:
         """(16,) as :func:`pneumo_ros.plant.sensors.truth`; command (4,), road (2,)."""

@@ -120,7 +120,7 @@ class Signals:
 
     @property
     def initial(self) -> NDArray[np.float64]:
-        """(10,) state of :mod:`pneumo_ros.plant.half_car` at row 0, estimated from the measurements around it."""
+        """(10,) state of :mod:`pneumo_ros.plant.equations` at row 0, estimated from the measurements around it."""
         return self.start_state.state
 
     @property
