@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
-from pneumo_ros.diagnosis.fit.shooting import Sliceable
+from pneumo_ros.diagnosis.fit.shooting import Piece
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
@@ -35,7 +35,6 @@ from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 
-Piece = TypeVar("Piece", bound=Sliceable)
 Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a structure
 # (model, fit logs, held-out log, a structure or None, threads) -> of what the nominal model leaves, and of what it does
 Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]

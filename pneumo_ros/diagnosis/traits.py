@@ -8,13 +8,14 @@ misspelt property is an error of types and not a silent default.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 if TYPE_CHECKING:
     from pneumo_ros.diagnosis.fit.pace import Pace
+    from pneumo_ros.diagnosis.model import Record
     from pneumo_ros.diagnosis.signals.types import Limitation
 
 
@@ -98,7 +99,7 @@ class HasLimits(Protocol):
 class HasCoarse(Protocol):
     """A model that makes records of half the rate, for sensitivities."""
 
-    def coarse(self, record: Any) -> Any:
+    def coarse(self, record: Record) -> Record:
         """Every other row."""
 
 
@@ -106,7 +107,7 @@ class HasCoarse(Protocol):
 class HasChanges(Protocol):
     """A model that sees what the configuration of another record states differently."""
 
-    def changes(self, record: Any) -> dict[str, float]:
+    def changes(self, record: Record) -> dict[str, float]:
         """Factor on each parameter that differs, by name."""
 
 

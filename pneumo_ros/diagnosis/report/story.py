@@ -15,7 +15,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.judge.verdict import Calibration
-from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard, ShownLog, ToldEffect
 from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
 from pneumo_ros.diagnosis.report.steps import Asked, Step, next_steps
 from pneumo_ros.diagnosis.report.words import (
@@ -33,7 +33,6 @@ from pneumo_ros.diagnosis.report.words import (
     winner,
 )
 from pneumo_ros.diagnosis.result import DIFFERS
-from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
@@ -88,14 +87,14 @@ class Known:
     asked : what was typed
     """
 
-    library: Mapping[str, Any]
+    library: Mapping[str, ToldEffect]
     gains: Sequence[Gain] = ()
     priors: Mapping[str, tuple[float, float]] | None = None
     own: Sequence[str] = ()
     asked: Asked | None = None
 
 
-def gains(holdout: Any, runs: Mapping[str, Array], card: RigCard = HALF_CAR) -> list[Gain]:
+def gains(holdout: ShownLog, runs: Mapping[str, Array], card: RigCard = HALF_CAR) -> list[Gain]:
     """Of every usable signal, the one that is mended most (in its own standard deviations) first."""
     off = {key: _rms(holdout, runs[key]) for key in ("refit", "best")}
     order = np.argsort(-(off["refit"] - off["best"]) / holdout.scale)
@@ -108,7 +107,7 @@ def gains(holdout: Any, runs: Mapping[str, Array], card: RigCard = HALF_CAR) -> 
     return out
 
 
-def _rms(log: Any, run: Array) -> Array:
+def _rms(log: ShownLog, run: Array) -> Array:
     weight = np.maximum(log.weight.sum(axis=0), 1.0)
     return np.sqrt((log.weight * (log.measured - run) ** 2).sum(axis=0) / weight)
 
@@ -173,7 +172,7 @@ def places(summary: Mapping[str, Any]) -> str:
     return f"{', '.join(words)} of the gap"
 
 
-def _sizes(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> list[str]:
+def _sizes(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> list[str]:
     """Of each effect the parameters that the log determines; of a law of another kind what was measured of it."""
     entry = winner(summary)
     curves = {one["family"]: one["curve"] for one in summary.get("budget") or []
@@ -208,7 +207,7 @@ def _off(found: Sequence[Gain]) -> str:
     return "; ".join(words) + ", rms on the held-out log" if words else ""
 
 
-def check(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
+def check(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> str:
     """The check by hand of each effect of the verdict, with the values that were found."""
     entry = winner(summary)
     several = len(entry["effects"]) > 1
@@ -220,7 +219,7 @@ def check(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
     return "; ".join(out)
 
 
-def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, Effect]) -> str:
+def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, ToldEffect]) -> str:
     """The check of the family's law that was found; '' where it has none.
 
     ``parameters`` : that were found; none where the law differs from the library's and its numbers mean little.
@@ -240,7 +239,7 @@ def _value(parameters: Mapping[str, Any], effect: str, name: str) -> float | Non
     return None if found is None or found["value"] is None else float(found["value"])
 
 
-def _rivals(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
+def _rivals(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> str:
     """What else is possible, each with its probability and how it differs by hand."""
     own = str(summary["verdict"]).split("+")
     names = [name for name in summary.get("ambiguity_group") or [] if name != summary["verdict"]]
@@ -254,7 +253,7 @@ def _rivals(summary: Mapping[str, Any], library: Mapping[str, Effect]) -> str:
     return "; ".join(out)
 
 
-def _difference(library: Mapping[str, Effect], one: str, other: str) -> str:
+def _difference(library: Mapping[str, ToldEffect], one: str, other: str) -> str:
     """What tells ``other`` from ``one``, as the guide of either has it."""
     for first, second in ((one, other), (other, one)):
         effect = library.get(first)

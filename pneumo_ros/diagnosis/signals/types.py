@@ -114,6 +114,11 @@ class Signals:
     limitations: tuple[Limitation, ...] = ()
 
     @property
+    def rig_name(self) -> str:
+        """As its file has it."""
+        return self.rig.name
+
+    @property
     def time(self) -> NDArray[np.float64]:
         """(N,) s from row 0."""
         return np.asarray(np.arange(len(self.measured)) * self.period, dtype=float)

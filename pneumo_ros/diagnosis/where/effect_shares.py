@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from pneumo_ros.effects.parameters import Active
 
 
 def effect_shares(
-    model: Model, record: Any, nuisance: Array, initial: Array, active: Sequence[Active], explained: float
+    model: Model, record: Record, nuisance: Array, initial: Array, active: Sequence[Active], explained: float
 ) -> list[tuple[str, float]]:
     """Places with their share of the gap, largest first.
 
