@@ -24,7 +24,8 @@ from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_ru
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import Diagnosis, Gap
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
@@ -83,7 +84,7 @@ def diagnose(
     Parameters
     ----------
     model : :class:`pneumo_ros.effects.rig_model.RigModel` for the half car
-    fit_logs : records to fit, see :class:`pneumo_ros.diagnosis.model.Record`
+    fit_logs : records to fit, see :class:`pneumo_ros.diagnosis.record.Record`
     holdout : record that nothing is fitted to
     progress : called with the share done and what is being done
     edit : a record of the rig after a known change, predicted without refitting

@@ -18,7 +18,7 @@ import numpy as np
 from pneumo_ros.diagnosis.fit.averaging import average
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 
 SEPARATES: Final = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart [taste]
 STEP: Final = 0.5  # prior sigmas by which a nuisance parameter is moved to see its answer [numerics]

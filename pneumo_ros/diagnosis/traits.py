@@ -15,7 +15,7 @@ from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 if TYPE_CHECKING:
     from pneumo_ros.diagnosis.fit.pace import Pace
-    from pneumo_ros.diagnosis.model import Record
+    from pneumo_ros.diagnosis.record import Record
     from pneumo_ros.diagnosis.signals.types import Limitation
 
 

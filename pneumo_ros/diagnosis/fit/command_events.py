@@ -19,7 +19,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, level
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 
 # prior sigma of a lead, samples: a lead costs something, so that jumps nothing depends on stay where the log has them
 # [taste]

@@ -15,7 +15,7 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 
 WINDOWS: Final = 2  # windows in a time block [taste]
 ALL: Final = -1  # as a fold: no block is kept from the fit [definition]

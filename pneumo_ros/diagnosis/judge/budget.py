@@ -23,7 +23,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit
 from pneumo_ros.diagnosis.judge.held_out import free_run
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import restricted
 from pneumo_ros.effects.parameters import Active, family_of
 

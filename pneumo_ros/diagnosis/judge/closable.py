@@ -19,7 +19,8 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_fo
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
-from pneumo_ros.diagnosis.model import HasCeilings, Record
+from pneumo_ros.diagnosis.model import HasCeilings
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced, with_parts
 from pneumo_ros.diagnosis.search.screening import SENSOR

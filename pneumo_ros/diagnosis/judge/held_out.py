@@ -11,7 +11,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import INITIAL_WIDENING, scale_of, stated_form
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.effects.parameters import Active
 
 

@@ -12,7 +12,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, free_run, total_gap
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import EditTest
 from pneumo_ros.diagnosis.traits import HasChanges
 from pneumo_ros.effects.parameters import Active

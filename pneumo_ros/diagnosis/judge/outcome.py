@@ -12,7 +12,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.selection import Scored
 from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import Active

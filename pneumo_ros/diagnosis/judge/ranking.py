@@ -15,7 +15,8 @@ from pneumo_ros.diagnosis.judge.held_out import bootstrap_shrink
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, held_by
 from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import Ranked
 from pneumo_ros.diagnosis.search.selection import Scored, log_weight
 from pneumo_ros.effects.parameters import Active, family_of

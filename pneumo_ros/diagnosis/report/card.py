@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from pneumo_ros.arrays import Array, Mask
-from pneumo_ros.diagnosis.model import EffectLike, Record
+from pneumo_ros.diagnosis.model import EffectLike
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.report.rig_map import draw_map
 from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.signals.types import TopicTiming
