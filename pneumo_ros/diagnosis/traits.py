@@ -43,7 +43,7 @@ class HasScale(Protocol):
 
     @property
     def scale(self) -> Array:
-        """(C,)."""
+        """(C,) standard deviation of each channel, in its unit."""
 
 
 @runtime_checkable
@@ -80,7 +80,7 @@ class ActsElsewhere(Protocol):
 
     @property
     def elsewhere(self) -> tuple[str, ...]:
-        """Those places."""
+        """Names of those places."""
 
 
 @runtime_checkable
@@ -100,7 +100,7 @@ class HasCoarse(Protocol):
     """A model that makes records of half the rate, for sensitivities."""
 
     def coarse(self, record: Record) -> Record:
-        """Every other row."""
+        """The record with every other row, so of twice the period."""
 
 
 @runtime_checkable

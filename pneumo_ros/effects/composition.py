@@ -209,7 +209,7 @@ def _switches(slots: Sequence[Slot]) -> str:
 
 
 def _tuples(slots: Sequence[Slot]) -> str:
-    """parameters, at_rest, restored."""
+    """Source lines of the helpers that make tuples of a term's parameters and states."""
     places = _places(slots)
 
     def nested(name: str, count: Callable[[_Place], int]) -> str:

@@ -67,7 +67,7 @@ class Ends(NamedTuple):
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """0 and/or 1."""
+        """Columns of the ends that act: 0 front, 1 rear."""
         return tuple(i for i, on in enumerate(self) if on)
 
 

@@ -119,7 +119,7 @@ class CorrectedRig:
         return state.channels
 
     def plant_state(self, state: CorrectedState) -> Array:
-        """What really moves."""
+        """State of the half car, (10,), without what effects remember."""
         return state.plant
 
     def truth(self, state: CorrectedState, command: Array, road: Array) -> Array:
