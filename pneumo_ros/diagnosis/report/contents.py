@@ -13,10 +13,11 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
 from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard, ShownLog, ToldEffect
+from pneumo_ros.diagnosis.report.facts import own_parameters
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.diagnosis.report.quantities import quantity_cells, readable
 from pneumo_ros.diagnosis.report.steps import Asked
-from pneumo_ros.diagnosis.report.story import Known, Story, gains, own_parameters, story
+from pneumo_ros.diagnosis.report.story import Known, Story, gains, story
 from pneumo_ros.diagnosis.report.words import (
     LIKELY,
     effect_name,
