@@ -8,15 +8,15 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint types unit colcon floors other other-environment headers bench mutants docs real blind blind-ci lock clean help
+.PHONY: demo test lint types kernels unit colcon floors other other-environment headers bench mutants docs real blind blind-ci lock clean help
 
 help:  ## Show this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/ -/'
 
 $(READY): requirements.lock setup.py package.xml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --require-hashes \
-		-r requirements.lock
+	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --no-compile \
+		--require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --no-input --no-deps --no-build-isolation --editable .
 	@touch $@
 
@@ -25,7 +25,9 @@ SEED ?= 1
 demo: $(READY)  ## A rig with a hidden effect, two sessions, the diagnosis, the answer beside it (2 min; SEED=2 draws another)
 	$(BIN)/pneumo demo --seed $(SEED)
 
-test: lint types unit  ## Lint, types and every test
+test: $(READY)  ## Lint, types and every test
+	$(MAKE) --jobs=2 --output-sync=target lint types kernels
+	$(MAKE) unit
 
 lint: $(READY)
 	$(BIN)/ruff format --check .
@@ -33,6 +35,10 @@ lint: $(READY)
 
 types: $(READY)
 	$(BIN)/mypy
+
+# What tests run, compiled once before several processes of theirs would each compile it (a minute on a fresh checkout).
+kernels: $(READY)
+	PYTHONPATH=test $(BIN)/python -m helpers.kernels
 
 # Two processes share the files of tests; those of the clock have the computer to themselves afterwards.
 WORKERS ?= 2
@@ -53,8 +59,8 @@ FAST ?= msg_tests test/plant test/estimation test/nodes/test_qos_overrides.py te
 
 $(FLOORS_READY): floors.txt setup.py package.xml
 	$(PYTHON) -m venv $(FLOORS)
-	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check --constraint floors.txt --editable '.[ros,test]' \
-		colcon-common-extensions
+	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint floors.txt \
+		--editable '.[ros,test]' colcon-common-extensions
 	$(FLOORS)/bin/python -m pip uninstall --quiet --yes pneumo_ros
 	@touch $@
 
@@ -79,7 +85,8 @@ OTHERS = .venv-$(notdir $(patsubst %/bin/python,%,$(OTHER)))
 
 other-environment:
 	test -e $(OTHERS)/.ready || { $(OTHER) -m venv $(OTHERS) && \
-		$(OTHERS)/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[ros,test]' && touch $(OTHERS)/.ready; }
+		$(OTHERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --editable '.[ros,test]' && \
+		touch $(OTHERS)/.ready; }
 
 other: other-environment  ## The fast part on another Python (OTHER=python3.13; 2 min)
 	$(OTHERS)/bin/python -m pytest $(FAST) -m "not slow" -k "not parquet"

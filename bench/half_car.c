@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The half car of pneumo_ros.plant.half_car in plain C: same equations, same branches, same RK4.
+/* The half car of pneumo_ros.plant (equations, integrator) in plain C: same equations, same branches, same RK4.
  * The limit that bench/kernel.py measures the compiled Python against. */
 #include <math.h>
 #include <string.h>

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from helpers.folders import ROOT
 from helpers.other_makers import gearbox, quarter_car
 
 from pneumo_ros.diagnosis.result import Diagnosis

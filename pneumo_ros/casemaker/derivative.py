@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Right-hand side of the richer rig.
 
-State: 0-9 as :mod:`pneumo_ros.plant.half_car`; then one block of 21 for each end (bristle, bellows memory, bellows
+State: 0-9 as :mod:`pneumo_ros.plant.equations`; then one block of 21 for each end (bristle, bellows memory, bellows
 mode and rate, spool and rate, air mass, exciter and rate, line flow and rate, gauge and rate, five sliders, wall
 temperature, second chamber's pressure, tyre's memory), then tank pressure, loose payload and rate, exciter base and
 rate, flow that refills the tank. A state whose effect is off stays where it starts.

@@ -7,11 +7,12 @@ the two leave is the case's grade. This is a ruler, not a diagnosis: it knows no
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.rig.channels import channels_of_states
 
@@ -36,6 +37,8 @@ NUISANCE: tuple[tuple[str, str, float], ...] = (
     ("both", "supply", 0.005),
 )
 
+Solve = Callable[[Array, Array, Array, float], Array]
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -50,11 +53,11 @@ class Observation:
     noise : (6,) standard deviation of each channel
     """
 
-    measured: NDArray[np.float64]
-    commands: NDArray[np.float64]
-    road: NDArray[np.float64]
+    measured: Array
+    commands: Array
+    road: Array
     period: float
-    noise: NDArray[np.float64]
+    noise: Array
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,11 @@ class Null:
     """The refit of a log without its effect: gap left, parameters' logs, sensitivities per sigma (rows decimated)."""
 
     gap: float
-    logs: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
+    logs: Array
+    jacobian: Array
 
 
-def perturbed(car: HalfCar, logs: NDArray[np.float64]) -> HalfCar:
+def perturbed(car: HalfCar, logs: Array) -> HalfCar:
     """The plant with its 16 uncertain parameters multiplied by exp(logs)."""
     body, gases = car.body._asdict(), {"front": car.front, "rear": car.rear}
     for (part, name, _), log in zip(NUISANCE, logs, strict=True):
@@ -87,7 +90,7 @@ def perturbed(car: HalfCar, logs: NDArray[np.float64]) -> HalfCar:
     return HalfCar(type(car.body)(**body), gases["front"], gases["rear"], car.surface, car.step)
 
 
-def free_run(car: HalfCar, seen: Observation) -> NDArray[np.float64]:
+def free_run(car: HalfCar, seen: Observation) -> Array:
     """The plant's six outputs, (N + 1, 6), driven by the log's commands and road from its first sample."""
     a, b = car.body.front_arm, car.body.rear_arm
     first = seen.measured[0]
@@ -97,15 +100,13 @@ def free_run(car: HalfCar, seen: Observation) -> NDArray[np.float64]:
     return np.column_stack(channels_of_states(x, a, b))
 
 
-def gap(model: NDArray[np.float64], seen: Observation) -> float:
+def gap(model: Array, seen: Observation) -> float:
     """Contract section 3: RMS over channels of rms(log - model) / std(log)."""
     share = np.sqrt(np.mean((seen.measured - model) ** 2, axis=0)) / np.std(seen.measured, axis=0)
     return float(np.sqrt(np.mean(share**2)))
 
 
-def refit(
-    car: HalfCar, seen: Observation, start: NDArray[np.float64] | None = None, rounds: int = 25
-) -> tuple[float, NDArray[np.float64]]:
+def refit(car: HalfCar, seen: Observation, start: Array | None = None, rounds: int = 25) -> tuple[float, Array]:
     """Gap that a Levenberg-Marquardt refit of the tolerance parameters leaves, and the parameters' logs.
 
     ``start`` are logs to begin at (those of the same rig without its effect save most of the rounds). Parameters stop
@@ -139,10 +140,18 @@ def refit(
     return best, at * sigma
 
 
-def quick_gap(car: HalfCar, seen: Observation, null: Null) -> float:
+def quick_gap(car: HalfCar, seen: Observation, null: Null, solve: Solve | None = None) -> float:
     """About what :func:`refit` would leave: the linear refit with the sensitivities of the log without its effect.
 
     One simulation instead of some sixty, and smooth in the size of an effect: good enough to search from.
+
+    Parameters
+    ----------
+    car : nominal half car
+    seen : the log with its effect
+    null : refit of the same log without it
+    solve : (sensitivities per sigma, error, parameters, sigmas, weight of the prior) -> step, sigmas;
+        :func:`_damped_step` without damping where none is given
     """
     sigma = np.array([s for _, _, s in NUISANCE])
     scale = np.std(seen.measured, axis=0)
@@ -151,7 +160,7 @@ def quick_gap(car: HalfCar, seen: Observation, null: Null) -> float:
         return np.inf
     jacobian = null.jacobian / np.tile(scale, len(model[::DECIMATE]))[:, None]
     error = ((seen.measured - model)[::DECIMATE] / scale).ravel()
-    step = _damped_step(jacobian, error, null.logs / sigma, float(np.mean(seen.noise / scale)), 0.0)
+    step = (solve or _undamped)(jacobian, error, null.logs / sigma, float(np.mean(seen.noise / scale)))
     return float(np.sqrt(np.mean((error - jacobian @ step) ** 2)))
 
 
@@ -162,9 +171,11 @@ def null_of(car: HalfCar, seen: Observation) -> Null:
     return Null(left, logs, _jacobian(car, logs, free_run(perturbed(car, logs), seen), seen, sigma))
 
 
-def _damped_step(
-    jacobian: NDArray[np.float64], error: NDArray[np.float64], at: NDArray[np.float64], prior: float, damping: float
-) -> NDArray[np.float64]:
+def _undamped(jacobian: Array, error: Array, at: Array, prior: float) -> Array:
+    return _damped_step(jacobian, error, at, prior, 0.0)
+
+
+def _damped_step(jacobian: Array, error: Array, at: Array, prior: float, damping: float) -> Array:
     """Step in sigmas; a parameter that would leave +-3 sigma is put on that bound and the others are solved again."""
     normal, slope = jacobian.T @ jacobian, jacobian.T @ error
     normal = normal + prior**2 * np.eye(len(at)) + damping * np.diag(np.diag(normal))
@@ -181,9 +192,7 @@ def _damped_step(
     return step
 
 
-def _jacobian(
-    car: HalfCar, logs: NDArray[np.float64], model: NDArray[np.float64], seen: Observation, sigma: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _jacobian(car: HalfCar, logs: Array, model: Array, seen: Observation, sigma: Array) -> Array:
     columns = []
     for i, width in enumerate(sigma):
         moved = logs.copy()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from pneumo_ros.casemaker.gap_size import DECIMATE, NUISANCE, Null, Observation, free_run, perturbed
+from pneumo_ros.casemaker.gap_size import DECIMATE, NUISANCE, Null, Observation, free_run, perturbed, quick_gap
 from pneumo_ros.plant.half_car import HalfCar
 
 SIGMA = np.array([s for _, _, s in NUISANCE])
@@ -52,11 +52,4 @@ def bounded_step(jacobian: Logs, error: Logs, at: Logs, prior: float) -> Logs:
 
 def bounded_gap(car: HalfCar, seen: Observation, null: Null) -> float:
     """What :func:`pneumo_ros.casemaker.gap_size.refit` would leave about, from the sensitivities without the effect."""
-    scale = np.std(seen.measured, axis=0)
-    model = free_run(perturbed(car, null.logs), seen)
-    if not np.isfinite(model).all():
-        return np.inf
-    jacobian = null.jacobian / np.tile(scale, len(model[::DECIMATE]))[:, None]
-    error = ((seen.measured - model)[::DECIMATE] / scale).ravel()
-    step = bounded_step(jacobian, error, null.logs / SIGMA, float(np.mean(seen.noise / scale)))
-    return float(np.sqrt(np.mean((error - jacobian @ step) ** 2)))
+    return quick_gap(car, seen, null, bounded_step)

@@ -81,7 +81,7 @@ def in_frame(rig: RicherRig, **changes: float) -> RicherRig:
 
 
 def with_law(rig: RicherRig, side: str | None, row: int, number: int, *values: float) -> RicherRig:
-    """The rig with a second law at the ends of a side; what is shared stands with the front end."""
+    """The rig with a second law at the ends of a side; a law of the whole rig is kept in the front end's row."""
     ends = ("front",) if row in SHARED else ends_of(side)
     kept = tuple(law for law in rig.laws if law.row != row or law.end not in ends)
     return rig._replace(laws=kept + tuple(Law(end, row, number, values) for end in ends))
@@ -93,7 +93,7 @@ def places_of(side: str | None, what: str) -> tuple[str, ...]:
 
 
 def sign(rng: np.random.Generator) -> float:
-    """-1 or 1."""
+    """A random sign, -1 or 1."""
     return float(rng.choice([-1.0, 1.0]))
 
 
@@ -124,7 +124,7 @@ def effect(
 def second_law(
     name: str, law: str, *, foreign: bool = True, sides: tuple[str | None, ...] | None = None
 ) -> Callable[[Apply], Apply]:
-    """Register a function as another law of a known effect, at the first law's sides unless told."""
+    """Register a function as another law of a known effect; at the sides of the first law unless told."""
 
     def register(function: Apply) -> Apply:
         where = REGISTRY[name].sides if sides is None else sides

@@ -42,7 +42,8 @@ from pneumo_ros.control.reference_model import advance_reference, reference_jerk
 from pneumo_ros.errors import InputError
 from pneumo_ros.parameters import Parameter, Value, settings
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, load_surface
-from pneumo_ros.plant.half_car import gas_of, unpack_gas
+from pneumo_ros.plant.half_car import gas_of
+from pneumo_ros.plant.integrator import unpack_gas
 from pneumo_ros.plant.trim import Trim, trim
 from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import HEAVE, PITCH

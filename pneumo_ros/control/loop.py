@@ -30,7 +30,9 @@ from numpy.typing import NDArray
 from pneumo_ros.control.half_car import Controller, Law, control_half_car
 from pneumo_ros.estimation.half_car import Estimator, Model, estimate_areas, estimate_half_car
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
-from pneumo_ros.plant.half_car import Body, HalfCar, derivative, simulate, substeps
+from pneumo_ros.plant.equations import Body, derivative
+from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.integrator import simulate, substeps
 from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import sprung_points
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
-from pneumo_ros.diagnosis.fit.shooting import Sliceable
+from pneumo_ros.diagnosis.fit.shooting import Piece
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
@@ -24,7 +24,8 @@ from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_ru
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import Diagnosis, Gap
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
@@ -35,7 +36,6 @@ from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 
-Piece = TypeVar("Piece", bound=Sliceable)
 Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a structure
 # (model, fit logs, held-out log, a structure or None, threads) -> of what the nominal model leaves, and of what it does
 Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]
@@ -84,7 +84,7 @@ def diagnose(
     Parameters
     ----------
     model : :class:`pneumo_ros.effects.rig_model.RigModel` for the half car
-    fit_logs : records to fit, see :class:`pneumo_ros.diagnosis.model.Record`
+    fit_logs : records to fit, see :class:`pneumo_ros.diagnosis.record.Record`
     holdout : record that nothing is fitted to
     progress : called with the share done and what is being done
     edit : a record of the rig after a known change, predicted without refitting

@@ -18,6 +18,7 @@ import numpy as np
 from pneumo_ros.diagnosis.fit.averaging import average
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
+from pneumo_ros.diagnosis.record import Record
 
 SEPARATES: Final = 2.0  # noise standard deviations, rms, from which an experiment tells two structures apart [taste]
 STEP: Final = 0.5  # prior sigmas by which a nuisance parameter is moved to see its answer [numerics]
@@ -72,7 +73,7 @@ class NextExperiment(ABC):
         """Without the profile, which has files of its own."""
 
 
-def separation(problem: Problem, best: Fit, rival: Fit, record: Any) -> float:
+def separation(problem: Problem, best: Fit, rival: Fit, record: Record) -> float:
     """Root mean square of the rivals' difference over the noise, free of what nuisance parameters could answer.
 
     0 where either runs away.

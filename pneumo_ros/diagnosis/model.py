@@ -45,29 +45,6 @@ class PlainEffect:
     parameters: tuple[EffectParameter, ...]
 
 
-class Record(Protocol):
-    """A log on one time base: N rows, C channels."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def period(self) -> float:
-        """s between rows."""
-
-    @property
-    def measured(self) -> Array:
-        """(N, C), no NaN."""
-
-    @property
-    def weight(self) -> Array:
-        """(N, C), 0 where no sample is there."""
-
-    @property
-    def noise(self) -> Array:
-        """(C,) standard deviation of the sensor noise."""
-
-
 class Model(Protocol):
     """A simulator with nuisance parameters and a library of effects."""
 

@@ -8,13 +8,14 @@ misspelt property is an error of types and not a silent default.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 
 if TYPE_CHECKING:
     from pneumo_ros.diagnosis.fit.pace import Pace
+    from pneumo_ros.diagnosis.record import Record
     from pneumo_ros.diagnosis.signals.types import Limitation
 
 
@@ -42,7 +43,7 @@ class HasScale(Protocol):
 
     @property
     def scale(self) -> Array:
-        """(C,)."""
+        """(C,) standard deviation of each channel, in its unit."""
 
 
 @runtime_checkable
@@ -101,15 +102,15 @@ class HasLimits(Protocol):
 class HasCoarse(Protocol):
     """A model that makes records of half the rate, for sensitivities."""
 
-    def coarse(self, record: Any) -> Any:
-        """Every other row."""
+    def coarse(self, record: Record) -> Record:
+        """The record with every other row, so of twice the period."""
 
 
 @runtime_checkable
 class HasChanges(Protocol):
     """A model that sees what the configuration of another record states differently."""
 
-    def changes(self, record: Any) -> dict[str, float]:
+    def changes(self, record: Record) -> dict[str, float]:
         """Factor on each parameter that differs, by name."""
 
 

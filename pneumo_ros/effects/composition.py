@@ -26,7 +26,7 @@ import numba
 
 from pneumo_ros.effects import hooks, kernel, oscillator
 from pneumo_ros.effects.cache import kept
-from pneumo_ros.plant import air_spring, half_car, orifice
+from pneumo_ros.plant import air_spring, equations, integrator, orifice
 from pneumo_ros.rig import channels
 
 Compiled = Any  # numba ships no types; a dispatcher of module level
@@ -132,7 +132,7 @@ def _load(source: str, files: tuple[str, ...]) -> ModuleType:
 
 
 def _files(slots: Sequence[Slot]) -> list[str]:
-    modules = [hooks, kernel, oscillator, channels, air_spring, half_car, orifice]
+    modules = [hooks, kernel, oscillator, channels, air_spring, equations, integrator, orifice]
     functions = [f for slot in slots for f in slot.term.functions.values()]
     return sorted({str(m.__file__) for m in modules} | {inspect.getsourcefile(f.py_func) or "" for f in functions})
 
@@ -213,7 +213,7 @@ def _switches(slots: Sequence[Slot]) -> str:
 
 
 def _tuples(slots: Sequence[Slot]) -> str:
-    """parameters, at_rest, restored."""
+    """Source lines of the helpers that make tuples of a term's parameters and states."""
     places = _places(slots)
 
     def nested(name: str, count: Callable[[_Place], int]) -> str:

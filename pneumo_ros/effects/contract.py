@@ -25,7 +25,7 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
 from pneumo_ros.plant.air_spring import Gas
-from pneumo_ros.plant.half_car import Body
+from pneumo_ros.plant.equations import Body
 from pneumo_ros.rig.channels import CHANNELS, PRESSURES
 
 Values = tuple[float, ...]
@@ -67,7 +67,7 @@ class Ends(NamedTuple):
 
     @property
     def columns(self) -> tuple[int, ...]:
-        """0 and/or 1."""
+        """Columns of the ends that act: 0 front, 1 rear."""
         return tuple(i for i, on in enumerate(self) if on)
 
 

@@ -20,7 +20,8 @@ from pneumo_ros.effects.contract import Inputs, Plant
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import NO_CORRECTION, Memories, RigModel
 from pneumo_ros.errors import PneumoError
-from pneumo_ros.plant.half_car import DEFAULT_STEP, HalfCar, substeps
+from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.integrator import DEFAULT_STEP, substeps
 from pneumo_ros.plant.sensors import read_channels, truth
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import Rig
@@ -34,7 +35,7 @@ class CorrectedState(NamedTuple):
 
     Attributes
     ----------
-    plant : (10,) of :mod:`pneumo_ros.plant.half_car`
+    plant : (10,) of :mod:`pneumo_ros.plant.equations`
     inner : (K, 2, S) states of the kernel's terms
     road : (2,) height that acts, m
     acting : (4,) openings that acted in the last period, m2
@@ -118,7 +119,7 @@ class CorrectedRig:
         return state.channels
 
     def plant_state(self, state: CorrectedState) -> Array:
-        """What really moves."""
+        """State of the half car, (10,), without what effects remember."""
         return state.plant
 
     def truth(self, state: CorrectedState, command: Array, road: Array) -> Array:

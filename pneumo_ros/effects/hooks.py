@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hand-written pieces of the composed kernel: what a plant term sees, and the air balance with a sagging supply.
 
-The nominal equations are those of :mod:`pneumo_ros.plant.half_car`; here their intermediate quantities have names so
+The nominal equations are those of :mod:`pneumo_ros.plant.equations`; here their intermediate quantities have names so
 that a term of an effect can use them.
 
 Kernel arguments
@@ -25,7 +25,7 @@ from typing import NamedTuple
 from numba import njit
 
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, outlet_flow, pressure_power
-from pneumo_ros.plant.half_car import Body
+from pneumo_ros.plant.equations import Body
 from pneumo_ros.plant.orifice import clamped_flow_function
 from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 

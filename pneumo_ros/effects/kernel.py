@@ -10,7 +10,7 @@ is the same function over generated ones that hold a library.
 
 Kernel arguments
 ----------------
-x : state (10,) of :mod:`pneumo_ros.plant.half_car`
+x : state (10,) of :mod:`pneumo_ros.plant.equations`
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of, air_rate, strut_of, tyre_loads, tyre_of
 from pneumo_ros.effects.terms import added, advanced, at_rest, parameters, restored, sagged, started, stored, switches
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
-from pneumo_ros.plant.half_car import Body, State, accelerations, moved
+from pneumo_ros.plant.equations import Body, State, accelerations
+from pneumo_ros.plant.integrator import moved
 from pneumo_ros.rig.channels import sprung_points
 
 __all__ = ["Feed", "Loads", "Signals", "added", "simulate"]

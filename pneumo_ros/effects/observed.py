@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.plant.half_car import Body
+from pneumo_ros.plant.equations import Body
 from pneumo_ros.rig.channels import CHANNELS, channels_of_states
 
 

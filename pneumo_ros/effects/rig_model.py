@@ -34,7 +34,8 @@ from pneumo_ros.effects.parameters import Active, Curve, Parameter
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.effects.switches import Layout, kernel_of, layout_of, room_for_states, slots_of, switches_of
 from pneumo_ros.plant.air_spring import AreaSurface, load_surface
-from pneumo_ros.plant.half_car import HalfCar, simulate, substeps
+from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.integrator import simulate, substeps
 from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import CHANNELS
 
@@ -191,7 +192,7 @@ class RigModel:
         correction: Array | None = None,
         rows: int | None = None,
     ) -> Array:
-        """States of :mod:`pneumo_ros.plant.half_car`, (rows or N, 10)."""
+        """States of :mod:`pneumo_ros.plant.equations`, (rows or N, 10)."""
         count = len(record.measured) if rows is None else rows
         inputs = Inputs(record.commands[: count - 1], record.road[:count])
         if nuisance is not None:

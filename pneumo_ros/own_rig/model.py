@@ -60,7 +60,7 @@ class OwnRig:
 
     @cached_property
     def effects(self) -> Mapping[str, SlotEffect]:
-        """Those that compete."""
+        """Effects that compete, by id: the library without the withheld families."""
         return {name: one for name, one in self.library.items() if name.partition(".")[0] not in self.withheld}
 
     @cached_property
@@ -79,7 +79,7 @@ class OwnRig:
         return np.array([FLOW if isinstance(s, Flow) else FORCE for s in self.physics.inside], dtype=np.int64)
 
     def places(self, active: Active) -> tuple[str, ...]:
-        """The slot."""
+        """Name of the slot that the effect acts at."""
         return (active.site,)
 
     def side(self, active: Active) -> str | None:

@@ -14,7 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pneumo_ros.plant.air_spring import AreaSurface, effective_area
-from pneumo_ros.plant.half_car import HalfCar, derivative, unpack_body, unpack_gas
+from pneumo_ros.plant.equations import derivative
+from pneumo_ros.plant.half_car import HalfCar
+from pneumo_ros.plant.integrator import unpack_body, unpack_gas
 from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import channels_of_states, sprung_points
 

@@ -30,7 +30,7 @@ class SteppedRig(Protocol):
         """What the sensors show without noise, (6,) of :data:`pneumo_ros.rig.channels.CHANNELS`."""
 
     def plant_state(self, state: Any) -> Array:
-        """(10,) of :mod:`pneumo_ros.plant.half_car`."""
+        """(10,) of :mod:`pneumo_ros.plant.equations`."""
 
     def truth(self, state: Any, command: Array, road: Array) -> Array:
         """(16,) as :func:`pneumo_ros.plant.sensors.truth`; command (4,), road (2,)."""
@@ -60,19 +60,19 @@ class PlainRig:
     period: float
 
     def init(self) -> Array:
-        """At trim."""
+        """The state at trim, (10,)."""
         return self.start
 
     def step(self, state: Array, command: Array, road: Array) -> Array:
-        """One period."""
+        """The state one period later, (10,)."""
         return self.car.advance(state, command, road, self.period)
 
     def read(self, state: Array) -> tuple[float, ...]:
-        """Ideal sensors."""
+        """What sensors without error show, (6,)."""
         return read_channels(state, self.car.body.front_arm, self.car.body.rear_arm)
 
     def plant_state(self, state: Array) -> Array:
-        """Itself."""
+        """The state itself, which is the plant's, (10,)."""
         return state
 
     def truth(self, state: Array, command: Array, road: Array) -> Array:
@@ -80,7 +80,7 @@ class PlainRig:
         return truth(self.car, state, command, road)
 
     def supply(self, state: Array) -> float:
-        """Constant."""
+        """The rig's supply pressure, which is constant, Pa absolute."""
         return self.car.front.supply_pressure
 
     def with_supply(self, pressure: float) -> PlainRig:

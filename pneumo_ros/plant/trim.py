@@ -21,7 +21,7 @@ class Trim:
 
     Attributes
     ----------
-    state : (10,) of :mod:`pneumo_ros.plant.half_car`
+    state : (10,) of :mod:`pneumo_ros.plant.equations`
     inlets : front and rear inlet openings that balance the outlets, m2
     outlets : front and rear outlet openings, m2
     pressures : front and rear, Pa absolute

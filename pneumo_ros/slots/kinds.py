@@ -72,7 +72,7 @@ class Force(Slot):
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Travel, rate, load."""
+        """The slot's functions of travel, its rate and, where it has one, the load."""
         return (self.travel, self.rate, self.load)
 
 

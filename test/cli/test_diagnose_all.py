@@ -8,8 +8,8 @@ import os
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
 from helpers.browser import browser
+from helpers.folders import ROOT
 from helpers.own_rigs import chamber_log
 from typer.testing import CliRunner, Result
 

@@ -12,7 +12,7 @@ import pytest
 from pneumo_ros.effects import kernel
 from pneumo_ros.effects.composition import _source
 from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.plant.half_car import derivative
+from pneumo_ros.plant.equations import derivative
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 
@@ -34,7 +34,7 @@ def driven(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def by_derivative(x: np.ndarray, commands: np.ndarray, road: np.ndarray) -> np.ndarray:
-    """The textbook's RK4 over :func:`pneumo_ros.plant.half_car.derivative`."""
+    """The textbook's RK4 over :func:`pneumo_ros.plant.equations.derivative`."""
     car, dt, out = nominal_half_car(load_rig())[0], PERIOD / STEPS, [x]
     parts = car.body, car.front, car.rear, car.surface
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -135,8 +135,12 @@ def own_context(domain: int | None = None, arguments: list[str] | None = None) -
         context.try_shutdown()
 
 
-def set_parameter(domain: int, node: str, name: str, value: object, timeout: float = 20.0) -> str:
-    """Set a parameter of a running node as `ros2 param set` does; '' or the reason it was refused."""
+@contextmanager
+def parameters_of(domain: int, node: str, timeout: float = 20.0) -> Iterator[Callable[[str, object], str]]:
+    """Sets parameters of a running node as `ros2 param set` does: (name, value) -> '' or the reason it was refused.
+
+    One node asks for all of them: each new one would first have to be found, which may take longer than the session.
+    """
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
@@ -148,8 +152,12 @@ def set_parameter(domain: int, node: str, name: str, value: object, timeout: flo
         executor.add_node(asker)
         client = AsyncParameterClient(asker, node)
         assert client.wait_for_services(timeout), f"{node} has no parameter services"
-        future = client.set_parameters([Parameter(name, value=value)])
-        executor.spin_until_future_complete(future, timeout)
-        result = future.result()
-        assert result is not None, f"{node} did not answer"
-        return "" if result.results[0].successful else str(result.results[0].reason)
+
+        def ask(name: str, value: object) -> str:
+            future = client.set_parameters([Parameter(name, value=value)])
+            executor.spin_until_future_complete(future, timeout)
+            result = future.result()
+            assert result is not None, f"{node} did not answer"
+            return "" if result.results[0].successful else str(result.results[0].reason)
+
+        yield ask

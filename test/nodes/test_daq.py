@@ -53,7 +53,8 @@ def session(folder: Path, duration: float, *arguments: str) -> tuple[int, str, L
     with emulated(link, *board(folder, *arguments)):
         code, said = sessions.run(
             "--source", "serial", "--port", str(link), "--calibration", CALIBRATION, "--duration", str(duration),
-            "--output", str(folder / "session.mcap"), "--no-picture", "--rate", str(RATE),
+            "--output", str(folder / "session.mcap"), "--rate", str(RATE), "--no-summary", "--no-picture",
+            "--no-report",
         )  # fmt: skip
     return code, said, read_log(folder / "session.mcap")
 

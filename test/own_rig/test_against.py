@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from helpers.folders import ROOT
 from helpers.own_rigs import chamber_log
 from typer.testing import CliRunner
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
 from helpers.fmus import FRAME_YAML, built, frame_log, with_names
+from helpers.folders import ROOT
 from typer.testing import CliRunner
 
 from pneumo_ros.cli import diagnose

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from helpers.fmus import FRAME_YAML, built, frame_log, with_names
+from helpers.folders import ROOT
 
 from pneumo_ros.diagnosis.diagnose import Options
+from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.own_rig.description import read_description
 from pneumo_ros.own_rig.fmu.model import load_fmu
@@ -33,6 +34,16 @@ def own(log: Path) -> OwnTask:
     names = FRAME_YAML.partition("fmu:")[0]
     (folder / "rig.yaml").write_text(names, encoding="utf-8")
     return prepared(ROOT / "examples/frame/rig.py", [log], rig=folder / "rig.yaml")
+
+
+Found = tuple[OwnTask, Diagnosis]
+
+
+@pytest.fixture(scope="module")
+def stepping(log: Path) -> Found:
+    """A co-simulation and what is found with it."""
+    task = prepared(with_names(built(log.parent / "CoSimulation.fmu", 2, ("CoSimulation",))), [log])
+    return task, task.diagnose(Options(pairs=False))
 
 
 def free(task: OwnTask) -> np.ndarray:
@@ -95,26 +106,23 @@ def test_a_run_that_fails_is_a_divergence_and_the_next_one_is_whole(log: Path, t
 
 
 @pytest.mark.slow
-def test_the_verdict_and_the_budget_are_the_rig_files(log: Path, own: OwnTask, tmp_path: Path) -> None:
+def test_the_verdict_and_the_budget_are_the_rig_files(log: Path, own: OwnTask, stepping: Found, tmp_path: Path) -> None:
     """By either interface; friction against the ground, which the log has. One effect at a time: pairs take thrice as
     long and are the search's business, which knows of no FMU.
     """
     wanted = own.diagnose(Options(pairs=False))
     assert wanted.verdict == "coulomb_friction" and wanted.location[0][0] == "floor_to_ground"
-    for interface in ("ModelExchange", "CoSimulation"):
-        task = prepared(with_names(built(tmp_path / f"{interface}.fmu", 2, (interface,))), [log])
-        found = task.diagnose(Options(pairs=False))
+    exchanging = prepared(with_names(built(tmp_path / "ModelExchange.fmu", 2)), [log])
+    for found in (exchanging.diagnose(Options(pairs=False)), stepping[1]):
         assert found.verdict == wanted.verdict and found.location[0][0] == "floor_to_ground"
         assert [(one.effects, one.places) for one in found.budget] == [(o.effects, o.places) for o in wanted.budget]
         assert [one.share for one in found.budget] == pytest.approx([one.share for one in wanted.budget], abs=0.03)
 
 
 @pytest.mark.slow
-def test_a_saved_rig_of_an_fmu_is_a_model_of_it(log: Path, tmp_path: Path) -> None:
-    fmu = with_names(built(tmp_path / "frame.fmu", 2, ("CoSimulation",)))
-    task = prepared(fmu, [log])
-    saved = save_rig(task.diagnose(Options(pairs=False)), task.model, tmp_path / "saved.yaml")
-    again = prepared(fmu, [log], rig=saved)
+def test_a_saved_rig_of_an_fmu_is_a_model_of_it(log: Path, stepping: Found, tmp_path: Path) -> None:
+    task, found = stepping
+    again = prepared(log.parent / "CoSimulation.fmu", [log], rig=save_rig(found, task.model, tmp_path / "saved.yaml"))
     assert {(one.effect.partition(".")[0], one.site) for one in again.model.configured} == {
         ("coulomb_friction", "floor_to_ground")}  # fmt: skip
     assert again.diagnose(Options(pairs=False)).verdict == "none"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from helpers.folders import ROOT
 from helpers.own_rigs import CART, CART_YAML, cart_log, written
 
 from pneumo_ros.errors import InputError

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from helpers.folders import ROOT
 
 from pneumo_ros.own_rig.from_files import prepared
 from pneumo_ros.own_rig.outputs import save_rig

@@ -21,7 +21,8 @@ from pneumo_ros.plant.air_spring import (
     spring_volume,
     volume_at_pressure,
 )
-from pneumo_ros.plant.half_car import DEFAULT_STEP, HalfCar, half_car, substeps
+from pneumo_ros.plant.half_car import HalfCar, half_car
+from pneumo_ros.plant.integrator import DEFAULT_STEP, substeps
 from pneumo_ros.plant.orifice import critical_ratio, flow_function, mass_flow
 from pneumo_ros.plant.trim import Trim, nominal_half_car
 from pneumo_ros.rig import load_rig

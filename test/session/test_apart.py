@@ -21,10 +21,11 @@ from pneumo_ros.log import topics
 from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.neighbours import LOOK_FOR, neighbours
-from pneumo_ros.session.claim import Claim
+from pneumo_ros.session.claim import Claim, runtime_folder
 
-SHORT = ("--duration", "2", "--seed", "5", "--no-picture", "--no-report")
-ENDLESS = ("--duration", "0", "--seed", "5", "--no-picture", "--no-report")
+QUIET = ("--seed", "5", "--no-picture", "--no-report", "--no-summary")
+SHORT = ("--duration", "2", *QUIET)
+ENDLESS = ("--duration", "0", *QUIET)
 SIGNALS = (topics.ROAD, *topics.MEASUREMENTS, topics.COMMAND, topics.ESTIMATE, topics.TRUTH)
 
 
@@ -60,13 +61,14 @@ def intruder(domain: int, topic: str) -> Iterator[Any]:
 @pytest.mark.slow
 def test_two_rigs_in_namespaces_of_one_domain_and_a_third_that_is_refused(tmp_path: Path, alone: Log) -> None:
     domain = sessions.own_domain()
-    started = {
-        name: sessions.start(
-            *ENDLESS, "--namespace", name, "--use-sim-time", "--output", str(tmp_path / f"{name}.mcap"), domain=domain
-        )
+    options = {
+        name: ("--namespace", name, "--use-sim-time", "--output", str(tmp_path / f"{name}.mcap"))
         for name in ("rig1", "rig2")
     }
-    sessions.wait_for(started["rig1"], tmp_path / "rig1.mcap.part", 1)  # they run as fast as they can: nobody waits
+    taken = runtime_folder() / f"domain-{domain}.rig1.lock"
+    taken.unlink(missing_ok=True)  # of a session that has ended
+    started = {name: sessions.start(*ENDLESS, *words, domain=domain) for name, words in options.items()}
+    sessions.wait_for(started["rig1"], taken, 1)  # its place, before both run as fast as they can
     third = sessions.start(*SHORT, "--namespace", "rig1", "--output", str(tmp_path / "third.mcap"), domain=domain)
     said, _ = third.communicate(timeout=180)
     for name, process in started.items():

@@ -71,6 +71,7 @@ def test_a_planted_law_is_found() -> None:
     assert best.parameters["loss_stiffness"][0] == pytest.approx(3000.0, rel=0.02) and best.gap < 0.15
 
 
+@pytest.mark.slow
 def test_the_verb_writes_both_tables(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["diagnose", "--tables", "--output", str(tmp_path)])
     assert result.exit_code == 0, result.output

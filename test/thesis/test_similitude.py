@@ -86,6 +86,7 @@ def test_full_scale_scaled_and_dimensionless_coincide(system: str) -> None:
         assert full < SAME and numbers < SAME
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_they_stop_coinciding_when_one_law_is_broken(system: str) -> None:
     for law in laws_of(system):

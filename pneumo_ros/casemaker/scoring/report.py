@@ -171,7 +171,7 @@ def _table(cases: Sequence[Case], rivals: Mapping[str, Sequence[Case]]) -> str:
 
 
 def lines_for(cases: Sequence[Case]) -> tuple[Line, ...]:
-    """The scores of a set: those of 0.4 where the labels carry budgets."""
+    """The lines of a set's table; sets from 0.4 on, whose labels carry budgets, have lines of their own."""
     return LINES_OF_BUDGETS if any("refit_share" in c.label for c in cases) else LINES
 
 
@@ -206,7 +206,7 @@ def _failures(cases: Sequence[Case]) -> str:
 
 
 def _short_of_grade(cases: Sequence[Case]) -> str:
-    """Effects whose largest sane size leaves a smaller gap than was wanted: said, not stretched."""
+    """Cases whose gap is below their grade even at the largest realistic size of the effect; they stay in the set."""
     rows = [
         [str(c.label["case"]), _truth_text(c.label), f"{c.label['grade']:g}", f"{c.label['ratio']['fit']:.2f}"]
         for c in cases

@@ -91,7 +91,7 @@ class RigSimulation:
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """(10,) of :mod:`pneumo_ros.plant.half_car`."""
+        """(10,) of :mod:`pneumo_ros.plant.equations`."""
         return self.stepped.plant_state(self._state)
 
     def values(self) -> list[float]:

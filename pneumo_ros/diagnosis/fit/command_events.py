@@ -11,7 +11,7 @@ they hold.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, level
+from pneumo_ros.diagnosis.record import Record
 
 # prior sigma of a lead, samples: a lead costs something, so that jumps nothing depends on stay where the log has them
 # [taste]
@@ -35,10 +36,10 @@ MOST_EVENTS: Final = 600  # jumps in all logs, one simulation each: more are not
 class HasEvents(Protocol):
     """A model whose inputs jump at times the log knows only to a sample."""
 
-    def events(self, record: Any) -> list[tuple[int, int]]:
+    def events(self, record: Record) -> list[tuple[int, int]]:
         """(row, column) of each jump: the first row that has the new value."""
 
-    def advanced(self, record: Any, events: list[tuple[int, int]], lead: Array) -> Any:
+    def advanced(self, record: Record, events: list[tuple[int, int]], lead: Array) -> Record:
         """The record with each jump ``lead`` (samples, 0..1) earlier, as the mean over the row before it."""
 
 

@@ -21,7 +21,8 @@ from pneumo_ros.diagnosis.fit.averaging import average, between, grouped
 from pneumo_ros.diagnosis.fit.pace import Pace
 from pneumo_ros.diagnosis.fit.record_pace import shared_pace
 from pneumo_ros.diagnosis.fit.together import Done, Item, each
-from pneumo_ros.diagnosis.model import Model, Record, parameters_at
+from pneumo_ros.diagnosis.model import Model, parameters_at
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.traits import HasCoarse, HasModelForm, HasScale, HasSlowNoise
 from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pneumo_ros.diagnosis.fit.pace import HALF_CAR, Pace
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.traits import HasPace
 
 

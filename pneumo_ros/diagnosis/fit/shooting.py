@@ -8,25 +8,28 @@ they find is the start of a free-run fit and no more: candidates are compared by
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Final, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
-from pneumo_ros.diagnosis.model import Record
+from pneumo_ros.diagnosis.record import Record
 
 WINDOWS: Final = 2  # windows in a time block [taste]
 ALL: Final = -1  # as a fold: no block is kept from the fit [definition]
 FAILED_GAP: Final = 1.0  # normalised gap of a free run that is worse than the log's own mean [definition]
 
 
+Piece = TypeVar("Piece", bound="Sliceable")
+
+
 @runtime_checkable
 class Sliceable(Record, Protocol):
     """A record that can be cut."""
 
-    def slice(self, first: int, last: int) -> Any:
+    def slice(self: Piece, first: int, last: int) -> Piece:
         """Rows ``first`` to ``last`` (excluded) with an initial state estimated anew."""
 
 
@@ -58,7 +61,7 @@ def carried(one: Problem, other: Problem, x: Array) -> Array:
     return np.concatenate([x[:shared], np.zeros(other.fixed - shared), x[one.fixed :]])
 
 
-def _windows(record: Record, fold: int, block: float) -> list[Any]:
+def _windows(record: Record, fold: int, block: float) -> list[Sliceable]:
     """Pieces of the blocks that the fit may see, see :attr:`Problem.block`."""
     if not isinstance(record, Sliceable):
         return []

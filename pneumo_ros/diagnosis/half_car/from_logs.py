@@ -98,7 +98,7 @@ def prepared(
 
 
 def _as_wired(model: RigModel, log: Signals) -> Signals:
-    """The log with what speaks for a sensor or a clock that is not as the contract has it, beside the nominal run.
+    """The log, with a limitation if the nominal run is far nearer once a mistake of wiring or clocks is undone.
 
     Raises
     ------

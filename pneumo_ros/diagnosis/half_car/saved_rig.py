@@ -98,7 +98,13 @@ def save_corrected_rig(found: Diagnosis, model: RigModel, path: Path) -> Path:
 
 
 def _put_beside(one: NamedEffect, folder: Path) -> None:
-    """A rig file may name an effect's source only where it stands beside it."""
+    """Copy the source of a user's own effect beside the rig file, which may name it from nowhere else.
+
+    Raises
+    ------
+    InputError
+        if the source changed since it was loaded, or another file has its name there.
+    """
     if not one.file:
         return
     source, target = Path(one.file), folder / Path(one.file).name

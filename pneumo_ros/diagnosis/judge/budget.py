@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import factorial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, scale_of
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.fit.solver import COST_FLOOR, Fit
 from pneumo_ros.diagnosis.judge.held_out import free_run
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import restricted
 from pneumo_ros.effects.parameters import Active, family_of
 
@@ -56,7 +57,7 @@ class Budget:
     floor: float
 
 
-def budget(problem: Problem, best: Fit, holdout: Any, floor: float, nominal: float, refit: float) -> Budget:
+def budget(problem: Problem, best: Fit, holdout: Record, floor: float, nominal: float, refit: float) -> Budget:
     """Shares of a fitted structure on the held-out record.
 
     Parameters
@@ -90,7 +91,7 @@ def _belongs(part: Part, law: Part, laws: Sequence[Part]) -> bool:
 
 
 def _squares(
-    problem: Problem, best: Fit, holdout: Any, players: Sequence[tuple[Part, ...]], most: float
+    problem: Problem, best: Fit, holdout: Record, players: Sequence[tuple[Part, ...]], most: float
 ) -> dict[frozenset[int], Array]:
     """Squared normalised error of each held-out row (N,), for every subset of effects, the tolerances answering.
 
@@ -152,7 +153,7 @@ def _shapley(count: int, squares: dict[frozenset[int], Array]) -> list[Array]:
     return out
 
 
-def _drawn(count: int, squares: dict[frozenset[int], Array], holdout: Any) -> list[Array]:
+def _drawn(count: int, squares: dict[frozenset[int], Array], holdout: Record) -> list[Array]:
     """Means of the players' shares over moving blocks of time drawn with replacement, (DRAWS,) each."""
     shares = _shapley(count, squares)
     if not shares:

@@ -60,9 +60,10 @@ def _entry(outcome: Outcome, opinion: Opinion, found: Budget, law: Part, cov: Ar
 
 
 def left_by_form(left: float, whole: float) -> float:
-    """Share, rms, of what an effect makes of the gap that its own law may be wrong by: all that is left may be its own.
+    """Largest relative error of an effect's law that the held-out log allows, 0 to 1: sqrt(left / whole).
 
-    ``left`` and ``whole`` : mean squares of the held-out gap with and without the effect
+    Whatever is left with the effect fitted may be an error of its law; ``left`` and ``whole`` are the mean squares of
+    the held-out gap with the effect and without it.
     """
     return float(np.sqrt(np.clip(left / max(whole, 1e-12), 0.0, 1.0)))
 
@@ -70,11 +71,20 @@ def left_by_form(left: float, whole: float) -> float:
 def measured_curve(
     problem: Problem, one: Fit, record: object, parts: Sequence[Part], cov: Array, form: float
 ) -> Curve | None:
-    """Curve of an effect's parts in a fitted structure with its 90 % band: what the covariance of its scaled unknowns
-    gives, and ``form`` of the curve's own rms, because what is left may be this law's.
+    """Measured law of an effect in a fitted structure, with a 90 % band; None where the effect has no curve.
 
-    Of whatever may act at several places, or in several ways at one, that which is used most, in typical amplitudes: a
-    force and a flow have no curve together.
+    The band holds the parameters' covariance and, added in squares, ``form`` times the rms of the curve: the error
+    that the law itself may have (:func:`left_by_form`). Of flexible corrections at several places, or of
+    several kinds at one, the curve is that of the most used one, in typical amplitudes: a force and a flow have no
+    common axes.
+
+    Parameters
+    ----------
+    problem, one : the fitted logs and the structure fitted to them
+    record : log along which the curve is evaluated
+    parts : the effect's law and shapes, all at one site
+    cov : covariance of all scaled unknowns of the fit
+    form : relative error of the law, 0 to 1
     """
     model = problem.model
     if not isinstance(model, HasCurves) or not parts:

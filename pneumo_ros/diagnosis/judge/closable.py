@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced, with_parts
 from pneumo_ros.diagnosis.search.screening import SENSOR
@@ -117,7 +118,9 @@ class Closable:
     own: float = 0.0
 
 
-def closable(problem: Problem, best: Fit, holdout: Any, floor: float, refit: float, places: Sequence[str]) -> Closable:
+def closable(
+    problem: Problem, best: Fit, holdout: Record, floor: float, refit: float, places: Sequence[str]
+) -> Closable:
     """Judge the best structure's effects against what is closable at their places and elsewhere.
 
     Parameters
@@ -168,7 +171,7 @@ def worth_asking(left: float, own: float, floor: float) -> bool:
     return left + TRACE * floor**2 < (1.0 - WORTH) * own
 
 
-def _followed(problem: Problem, holdout: Any, predicted: Array, law: Part, places: Sequence[str]) -> float:
+def _followed(problem: Problem, holdout: Record, predicted: Array, law: Part, places: Sequence[str]) -> float:
     """How far a reading follows, over what is asked of this kind of error; infinite where nothing is."""
     effect = problem.model.effects[law[0]]
     if not isinstance(effect, IsFollowed) or effect.follows <= 0.0:
@@ -191,7 +194,7 @@ def followed(reading: Array, there: Array) -> float:
 
 
 def _beside(
-    problem: Problem, best: Fit, holdout: Any, floor: float, one: EffectEvidence, rest: Remainder
+    problem: Problem, best: Fit, holdout: Record, floor: float, one: EffectEvidence, rest: Remainder
 ) -> EffectEvidence:
     """The evidence with what is missed of an effect once something acts where the rest lies."""
     if set(one.places) & set(rest.places) or one.without <= one.own:
@@ -208,7 +211,7 @@ def _above(gap: float, floor: float) -> float:
 
 
 def _anything(
-    problem: Problem, best: Fit, holdout: Any, floor: float, where: tuple[str, ...], left: float
+    problem: Problem, best: Fit, holdout: Record, floor: float, where: tuple[str, ...], left: float
 ) -> Remainder:
     """The structure with whatever may act at some places; ``left`` is its own held-out gap."""
     parts = _whatever(problem, where)
@@ -230,7 +233,9 @@ def _elsewhere(problem: Problem, law: Part, much: bool) -> tuple[tuple[str, ...]
     return effect.elsewhere_of(law[1])
 
 
-def _instead(problem: Problem, best: Fit, holdout: Any, floor: float, law: Part, where: tuple[str, ...]) -> Remainder:
+def _instead(
+    problem: Problem, best: Fit, holdout: Record, floor: float, law: Part, where: tuple[str, ...]
+) -> Remainder:
     """The structure with whatever may act at some places in place of one of its effects."""
     parts = _whatever(problem, where)
     bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))

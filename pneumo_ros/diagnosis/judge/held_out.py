@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,10 +12,11 @@ from pneumo_ros.diagnosis.fit.box import bounded_newton
 from pneumo_ros.diagnosis.fit.problem import INITIAL_WIDENING, scale_of, stated_form
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.effects.parameters import Active
 
 
-def free_run(model: Model, record: Any, nuisance: Array, active: Sequence[Active]) -> Array:
+def free_run(model: Model, record: Record, nuisance: Array, active: Sequence[Active]) -> Array:
     """Prediction of a held-out log from its measured initial state, (N, C).
 
     The state at the first row is refined on the first moments alone (``settle`` of its pace): sensors have noise.
@@ -25,7 +25,7 @@ def free_run(model: Model, record: Any, nuisance: Array, active: Sequence[Active
     return model.predict(record, nuisance, settle(model, record, nuisance, active), active)
 
 
-def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active], rounds: int = 2) -> Array:
+def settle(model: Model, record: Record, nuisance: Array, active: Sequence[Active], rounds: int = 2) -> Array:
     """Initial state (S,): measured, refined by least squares over the first moments within its own uncertainty."""
     rows = min(len(record.measured), max(8, round(pace_of(record).settle / record.period)))
     state, std = model.initial(record, active)
@@ -56,7 +56,7 @@ def settle(model: Model, record: Any, nuisance: Array, active: Sequence[Active],
     return state
 
 
-def channel_gaps(record: Any, predicted: Array) -> Array:
+def channel_gaps(record: Record, predicted: Array) -> Array:
     """(C,) rms of log - prediction over the std of the log's channel; 1e3 where it diverged, NaN without a sample."""
     there = record.weight > 0.0
     error = np.where(there, record.measured - predicted, 0.0)
@@ -69,7 +69,7 @@ def total_gap(per_channel: Array) -> float:
     return float(np.sqrt(np.nanmean(np.square(per_channel))))
 
 
-def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, seed: int = 1) -> tuple[float, float]:
+def bootstrap_shrink(record: Record, refit: Array, best: Array, draws: int = 400, seed: int = 1) -> tuple[float, float]:
     """90 % interval of 1 - gap(best)/gap(refit) by moving blocks of time, both errors drawn together.
 
     Blocks wrap around the end (Politis and Romano 1992), so that no part of the log is drawn less often than another.
@@ -89,11 +89,11 @@ def bootstrap_shrink(record: Any, refit: Array, best: Array, draws: int = 400, s
     return float(low), float(high)
 
 
-def total_floor(record: Any) -> float:
+def total_floor(record: Record) -> float:
     """Gap that sensors' noise and the model's stated form leave together."""
     return float(np.hypot(total_gap(noise_floor(record)), stated_form(record)))
 
 
-def noise_floor(record: Any) -> Array:
+def noise_floor(record: Record) -> Array:
     """(C,) gap that the sensors' white noise alone leaves; NaN for a channel without a sample."""
     return np.where((record.weight > 0.0).any(axis=0), record.noise / scale_of(record), np.nan)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Problem
@@ -13,6 +12,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.judge.budget import Budget
 from pneumo_ros.diagnosis.judge.closable import Closable
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.selection import Scored
 from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import Active
@@ -60,7 +60,7 @@ class Outcome:
     chosen: Scored
     base: Fit
     best: Fit
-    holdout: Any
+    holdout: Record
     runs: Mapping[str, HeldOut]
     closable: Closable
     budget: Budget

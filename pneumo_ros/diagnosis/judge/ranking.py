@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, held_by
 from pneumo_ros.diagnosis.judge.outcome import Outcome
 from pneumo_ros.diagnosis.judge.verdict import Opinion
 from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import Ranked
 from pneumo_ros.diagnosis.search.selection import Scored, log_weight
 from pneumo_ros.effects.parameters import Active, family_of
@@ -54,7 +55,7 @@ def _plain(effects: tuple[str, ...], probability: float, gap: float, fitted: flo
     return Ranked(effects, (), None, probability, {}, gap, 0.0, (0.0, 0.0), fitted)
 
 
-def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Any) -> Ranked:
+def _ranked(problem: Problem, one: Fit, probability: float, run: HeldOut, refit: HeldOut, holdout: Record) -> Ranked:
     laws = one.candidate.laws
     estimates = effect_estimates(problem, one, covariance(problem, one))
     notes = [f"{name} ended at its bound" for name, e in estimates.items() if e.at_bound]

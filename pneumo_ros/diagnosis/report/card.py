@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
+from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.model import EffectLike
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.report.rig_map import draw_map
 from pneumo_ros.diagnosis.signals import MEASURED
+from pneumo_ros.diagnosis.signals.types import TopicTiming
+from pneumo_ros.effects.guide import Guide
 
 # names of the channels on the page [display]
 TITLES: Final = {
@@ -17,6 +22,41 @@ TITLES: Final = {
 }  # fmt: skip
 # channel -> (unit shown, factor from SI) [display]
 UNITS: Final = {name: ("kPa", 1e-3) if name.endswith("pressure") else ("mm", 1e3) for name in MEASURED}
+
+
+class ToldEffect(EffectLike, Protocol):
+    """An effect as a reader is told of it."""
+
+    @property
+    def summary(self) -> str:
+        """What it is, in a few words."""
+
+    @property
+    def guide(self) -> Guide | None:
+        """How it is checked by hand, and what it is mistaken for."""
+
+
+class ShownLog(Record, Protocol):
+    """A held-out log as the page shows it."""
+
+    @property
+    def rig_name(self) -> str: ...
+
+    @property
+    def time(self) -> Array:
+        """(N,) s from row 0."""
+
+    @property
+    def scale(self) -> Array:
+        """(C,) standard deviation of each channel."""
+
+    @property
+    def usable(self) -> Mask:
+        """(C,) channels that carry anything."""
+
+    @property
+    def topics(self) -> Sequence[TopicTiming]:
+        """Timing of each topic."""
 
 
 @dataclass(frozen=True)

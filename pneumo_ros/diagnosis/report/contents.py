@@ -12,11 +12,12 @@ import numpy as np
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
-from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard
+from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard, ShownLog, ToldEffect
+from pneumo_ros.diagnosis.report.facts import own_parameters
 from pneumo_ros.diagnosis.report.plots import Line, ladder, plot, scatter, shrink_bar
 from pneumo_ros.diagnosis.report.quantities import quantity_cells, readable
 from pneumo_ros.diagnosis.report.steps import Asked
-from pneumo_ros.diagnosis.report.story import Known, Story, gains, own_parameters, story
+from pneumo_ros.diagnosis.report.story import Known, Story, gains, story
 from pneumo_ros.diagnosis.report.words import (
     LIKELY,
     effect_name,
@@ -58,9 +59,9 @@ class Findings:
 
     summary: Mapping[str, Any]
     trajectories: Mapping[str, Array]
-    holdout: Any
+    holdout: ShownLog
     fit_names: Sequence[str]
-    library: Mapping[str, Any] = field(default_factory=dict)
+    library: Mapping[str, ToldEffect] = field(default_factory=dict)
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     own: Sequence[str] = ()
     asked: Asked | None = None
@@ -132,7 +133,7 @@ def contents(found: Findings) -> dict[str, Any]:
 
 
 def _rig_name(found: Findings) -> str:
-    return found.card.name or str(found.holdout.rig.name)
+    return found.card.name or found.holdout.rig_name
 
 
 def _measured(summary: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -196,7 +197,7 @@ def _chart(found: Findings, c: int, first: int, last: int) -> dict[str, str]:
 _DRAWN: Final = ("nominal", "refit", "best")  # runs that are drawn over the log [display]
 
 
-def _zoom(log: Any, refit: Array) -> tuple[int, int]:
+def _zoom(log: ShownLog, refit: Array) -> tuple[int, int]:
     count = len(log.measured)
     rows = min(count, round(ZOOM * pace_of(log).period / log.period))
     error = np.mean(((log.measured - refit) * log.weight / log.scale) ** 2, axis=1)

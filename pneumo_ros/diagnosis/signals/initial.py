@@ -46,8 +46,8 @@ def estimate_initial(
     period : s
     rig : arms, and its static state where a channel is missing
 
-    A channel without samples there is replaced by what rest at design height would give, with a wide std, so that a fit
-    that frees the initial state does so in the right measure.
+    A channel without samples there is replaced by what rest at design height would give, with a wide std: a
+    fit of the initial state then starts from a prior as wide as what is known.
     """
     count = max(DEGREE + 3, round(WINDOW / period) + 1)
     points = [_smoothed(measured[:count, i], weight[:count, i], noise[i], period) for i in range(6)]

@@ -38,8 +38,8 @@ def white_noise(
 
     Differencing m times takes a smooth signal away and multiplies white noise by sqrt(C(2m, m)). What a drive steps
     from sample to sample is regressed out, its delay found first. Each order gives an upper bound (what is left of the
-    signal adds to it), so the smallest is taken; the median is deaf to shocks. Half a quantisation step is the floor,
-    uniform over a step: q / sqrt(12).
+    signal adds to it), so the smallest is taken; each is a median, which shocks do not move. The floor is what rounding
+    to a step q leaves, q / sqrt(12).
     """
     columns = _moving(drive)
     found = _least(_from_differences(values, weight, order) for order in ORDERS)
@@ -88,7 +88,7 @@ def _moving(drive: Array | None) -> Array | None:
 
 
 def _delay(values: Array, weight: Array, drive: Array) -> int:
-    """Rows from a command to its onset in the channel: where their differences agree best."""
+    """Rows from a command to its onset in the channel: where the differences of both have the largest product."""
     whole = _whole(weight, ONSET_ORDER)
     rest = np.where(whole, np.diff(values, n=ONSET_ORDER), 0.0)
     steps = np.diff(drive, n=ONSET_ORDER - 1, axis=0)[:-1]
@@ -114,7 +114,7 @@ def _beside_drive(values: Array, weight: Array, drive: Array, delay: int, order:
 
 
 def _unexplained(rest: Array, causes: Array, whole: NDArray[np.bool_]) -> Array:
-    """Residuals of the window's own gains, scaled up by the freedom those took."""
+    """Residuals of a least-squares fit of the causes in one window, scaled up for the degrees of freedom it used."""
     rows = int(np.count_nonzero(whole))
     if rows < max(MIN_SAMPLES, 4 * causes.shape[1]):
         return np.empty(0)

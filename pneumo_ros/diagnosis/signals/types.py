@@ -114,13 +114,18 @@ class Signals:
     limitations: tuple[Limitation, ...] = ()
 
     @property
+    def rig_name(self) -> str:
+        """As its file has it."""
+        return self.rig.name
+
+    @property
     def time(self) -> NDArray[np.float64]:
         """(N,) s from row 0."""
         return np.asarray(np.arange(len(self.measured)) * self.period, dtype=float)
 
     @property
     def initial(self) -> NDArray[np.float64]:
-        """(10,) state of :mod:`pneumo_ros.plant.half_car` at row 0, estimated from the measurements around it."""
+        """(10,) state of :mod:`pneumo_ros.plant.equations` at row 0, estimated from the measurements around it."""
         return self.start_state.state
 
     @property

@@ -29,7 +29,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.signals import MEASURED, Signals
 from pneumo_ros.diagnosis.where.features import SMOOTHING
 from pneumo_ros.plant.air_spring import AreaSurface, Gas
-from pneumo_ros.plant.half_car import Body, HalfCar, State, derivative
+from pneumo_ros.plant.equations import Body, State, derivative
+from pneumo_ros.plant.half_car import HalfCar
 
 
 class Subsystem(NamedTuple):

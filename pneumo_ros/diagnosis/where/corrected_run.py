@@ -114,7 +114,7 @@ def _gap_with(model: RigModel, location: Location, places: Sequence[str]) -> flo
 
 @dataclass(frozen=True)
 class _Mended:
-    """A started model with corrections of the bases put in."""
+    """A rig model at a fitted structure, its free run corrected by flexible corrections with these coefficients."""
 
     model: RigModel
     start: Start

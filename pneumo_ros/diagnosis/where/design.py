@@ -140,7 +140,7 @@ def with_sensor_columns(design: Design, model: RigModel, place: str, coefficient
 
 
 def sensor_noise(car: HalfCar, inputs: Inputs, windows: Windows, noise: Array, seed: int = 0) -> Array:
-    """(6,) standard deviation that white sensor noise alone gives each residual, by adding more of it."""
+    """(6,) standard deviation that white sensor noise alone gives each residual, found by adding simulated noise."""
     rng = np.random.default_rng(seed)
     base = weak_residuals(car, inputs, windows)
     draws = [

@@ -4,18 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import scale_of
-from pneumo_ros.diagnosis.model import Model, Record
+from pneumo_ros.diagnosis.model import Model
+from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.effects.parameters import Active
 
 
 def effect_shares(
-    model: Model, record: Any, nuisance: Array, initial: Array, active: Sequence[Active], explained: float
+    model: Model, record: Record, nuisance: Array, initial: Array, active: Sequence[Active], explained: float
 ) -> list[tuple[str, float]]:
     """Places with their share of the gap, largest first.
 

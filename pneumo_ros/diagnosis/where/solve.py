@@ -94,7 +94,7 @@ class Forms:
         return self._solved(frozenset(places))[0]
 
     def coefficients(self, places: Iterable[str]) -> Array:
-        """As :meth:`solve`, remembered."""
+        """Result of :meth:`solve`, kept for the next call with the same places."""
         return self._solved(frozenset(places))[1]
 
     def _ones(self, places: Iterable[str]) -> NDArray[np.intp]:

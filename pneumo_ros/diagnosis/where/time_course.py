@@ -173,7 +173,7 @@ def _complement(local: list[Array], shape: tuple[int, ...]) -> tuple[Array, floa
 
 
 def _without(courses: Array, residual: Array, columns: Array) -> tuple[Array, Array, float]:
-    """Residual and parameter columns with what time courses (M, n) can follow taken off; and how many they are."""
+    """Residual and parameter columns with what time courses (M, n) can follow taken off; the rank of the courses."""
     gram = courses @ courses.T
     size = float(np.trace(gram)) / len(gram)
     factor = cho_factor(gram + RIDGE * size * np.eye(len(gram)), check_finite=False)

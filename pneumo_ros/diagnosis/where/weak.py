@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.plant.air_spring import AreaSurface, Gas, effective_area, inlet_flow, outlet_flow, pressure_power
-from pneumo_ros.plant.half_car import Body, HalfCar
+from pneumo_ros.plant.equations import Body
+from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 
 # the equations of motion and of the air, in the order of the residuals' columns [definition]

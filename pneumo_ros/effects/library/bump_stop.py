@@ -22,7 +22,7 @@ Values = tuple[float, float, float, float]
 
 @njit(cache=True, error_model="numpy")
 def force(strut: Strut, z: tuple[float, ...], p: Values) -> float:
-    """Push below the height of contact, upwards on the body; a stop never pulls."""
+    """N upwards on the body, below the height of contact; never negative."""
     depth = max(0.0, BUMP_STOP_HEIGHT + p[1] - strut.height)
     return p[0] * depth * (1.0 + p[2] * depth) * max(0.0, 1.0 - p[3] * strut.rate)
 

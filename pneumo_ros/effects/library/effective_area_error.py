@@ -21,7 +21,7 @@ Values = tuple[float, float]
 
 @njit(cache=True, error_model="numpy")
 def force(strut: Strut, z: tuple[float, ...], p: Values) -> float:
-    """Gauge pressure on the area that the table lacks."""
+    """N upwards on the body: gauge pressure times the difference of the effective area from the table's."""
     return strut.gauge * strut.area * (p[0] + p[1] * (strut.height - MIDDLE) / MIDDLE)
 
 

@@ -29,7 +29,7 @@ def loaded(plant: Plant, ends: Ends, values: Values) -> Plant:
 
 
 def turned(plant: Plant, ends: Ends, values: Values) -> Plant:
-    """Adds inertia alone."""
+    """Adds pitch inertia only, kg m2, and no mass."""
     return loaded(plant, ends, (values[0], 0.0))
 
 

@@ -36,7 +36,8 @@ from pneumo_ros.plant.air_spring import (
     pressure_power,
     pressure_rate,
 )
-from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT, BUMP_STOP_STIFFNESS, DEFAULT_STEP, gas_of, substeps
+from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT, BUMP_STOP_STIFFNESS, gas_of
+from pneumo_ros.plant.integrator import DEFAULT_STEP, substeps
 from pneumo_ros.rig import Rig
 from pneumo_ros.units import GRAVITY, INCH, PSI
 

@@ -29,7 +29,7 @@ from pneumo_ros.control.linearisation import Compensation, Spring, believed_volu
 from pneumo_ros.control.reference_model import advance_reference, reference_jerk
 from pneumo_ros.estimation.least_squares import METHODS, update
 from pneumo_ros.plant.air_spring import MEAN_AREA, AreaSurface, Gas, effective_area
-from pneumo_ros.plant.half_car import substeps
+from pneumo_ros.plant.integrator import substeps
 from pneumo_ros.thesis.models.quarter_car import Corner, QuarterCar, QuarterTrim, quarter_derivative, simulate_quarter
 from pneumo_ros.units import CUBIC_INCH, GRAVITY, INCH, SQUARE_INCH
 

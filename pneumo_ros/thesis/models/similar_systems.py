@@ -166,7 +166,7 @@ def quarter_rates(car: Car, surface: AreaSurface | None = None) -> Rates:
 
 
 def half_rates(car: Car, surface: AreaSurface | None = None) -> Rates:
-    """State (10) of :mod:`pneumo_ros.plant.half_car`; orifices (4), road (2,) (Eqs. 4.63-4.68)."""
+    """State (10) of :mod:`pneumo_ros.plant.equations`; orifices (4), road (2,) (Eqs. 4.63-4.68)."""
     area = surface or load_surface()
 
     def rates(x: Vector, u: Vector, road: Vector) -> Vector:

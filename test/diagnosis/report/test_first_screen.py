@@ -12,8 +12,9 @@ from helpers.browser import browser
 from helpers.findings import LIBRARY, findings
 
 from pneumo_ros.diagnosis.report import render, write_report
+from pneumo_ros.diagnosis.report.facts import check
 from pneumo_ros.diagnosis.report.rig_map import colour
-from pneumo_ros.diagnosis.report.story import Known, check, gains, story
+from pneumo_ros.diagnosis.report.story import Known, gains, story
 from pneumo_ros.diagnosis.report.words import (
     closing_words,
     interval,

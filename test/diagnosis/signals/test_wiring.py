@@ -78,6 +78,7 @@ def test_commands_with_other_stamps_are_named(rows: int, word: str) -> None:
     assert found.code == "maybe_clock" and found.text.startswith("/valve/command") and word in found.text
 
 
+@pytest.mark.slow
 def test_no_effect_of_the_library_is_a_mistake_of_wiring() -> None:
     assert check_wiring(SOUND, MODEL.simulate) == []
     for name, effect in MODEL.effects.items():
