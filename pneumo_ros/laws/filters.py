@@ -12,6 +12,7 @@ fresh : nothing was filtered yet: the filter rests at the first sample
 A, B0, B1, C, D : of :class:`_Form`
 half, held, most : half the width of a play, where its follower was, how far one goes in a sample; in the input's
     unit
+up, down : share of the way that a follower goes in one sample
 """
 
 from __future__ import annotations
@@ -145,11 +146,30 @@ def played(u: Array, half: float, held: float) -> Array:
     return y
 
 
+def play(u: Array, half: float, memory: float | None = None) -> tuple[Array, float]:
+    """Backlash of a block; at rest at its first sample before."""
+    y = played(np.ascontiguousarray(u), half, float(u[0]) if memory is None else memory)
+    return y, float(y[-1])
+
+
 @njit(cache=True, nogil=True)
-def slewed(u: Array, most: float) -> Array:
-    """What follows its input (N,) by at most so much a sample, from where that begins."""
-    y, held = np.empty_like(u), u[0]
+def followed(u: Array, up: float, down: float, most: float, held: float) -> Array:
+    """What follows its input (N,) by a share of the way, one up and one down, and by at most so much a sample."""
+    y = np.empty_like(u)
     for i in range(u.shape[0]):
-        held += min(max(u[i] - held, -most), most)
+        step = u[i] - held
+        step *= up if step > 0.0 else down
+        held += min(max(step, -most), most)
         y[i] = held
     return y
+
+
+def slewed(u: Array, most: float) -> Array:
+    """What follows its input (N,) by at most so much a sample, from where that begins."""
+    return np.asarray(followed(np.ascontiguousarray(u), 1.0, 1.0, most, float(u[0])))
+
+
+def delayed_line(u: Array, period: float, delay: float) -> Array:
+    """Samples of a linearly interpolated signal that arrives ``delay`` s late, resting at its first value before."""
+    rows = np.arange(len(u))
+    return np.asarray(np.interp(rows - delay / period, rows, u))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mass on a spring and a damper, one step at a time: what terms of effects that ring have in common.
+"""A mass on a spring and a damper, one step at a time: what everything that rings has in common.
 
 Kernel arguments
 ----------------
@@ -7,6 +7,8 @@ x, v : where the mass is, m, and how fast, m/s, both at the state's instant
 to, rate : what it hangs on, m, half a step later than x, and its speed, m/s, held over the step
 frequency, damping_ratio : natural frequency, rad/s, and share of critical damping, 1
 free : share of the damping that acts against the ground and not against what it hangs on, 1
+stretch, stretching : of what hangs against the mass, m and m/s (what hangs on it ahead of the mass: positive)
+between : share of the damping that acts between the two
 dt : step, s
 """
 
@@ -32,3 +34,11 @@ def swung(
     e1 = fade * (e0 * c + (v0 + decay * e0) / ringing * s)
     v1 = fade * (v0 * c - (decay * v0 + frequency * frequency * e0) / ringing * s)
     return e1 + behind + to + 0.5 * dt * rate, v1 + rate
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def pulled(stretch: float, stretching: float, frequency: float, damping_ratio: float, between: float) -> float:
+    """Acceleration of the mass by spring and damper, m/s2: w^2 s + 2 zeta w b s'; what it hangs on is pulled back by
+    the mass times this.
+    """
+    return frequency * frequency * stretch + 2.0 * damping_ratio * frequency * between * stretching
