@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.rig_logs import signals_of, simulated
 
-from pneumo_ros.diagnosis.signals import Signals
+from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import ANYTHING, Active, family_of, is_law
 from pneumo_ros.effects.rig_model import RigModel

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.report.rig_map import draw_map
-from pneumo_ros.diagnosis.signals import MEASURED
 
 # names of the channels on the page [display]
 TITLES: Final = {

@@ -15,6 +15,7 @@ import pytest
 from helpers.findings import PLACES, findings
 from helpers.rig_logs import signals_of, simulated
 
+from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.report import render, write_outputs, write_report, write_residual_log
 from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.quantities import readable, rounded
@@ -26,7 +27,6 @@ from pneumo_ros.diagnosis.report.words import (
     place_words,
 )
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
-from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
