@@ -29,8 +29,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.diagnosis.diagnose import Options
 from pneumo_ros.diagnosis.half_car.from_logs import diagnose_files
+from pneumo_ros.diagnosis.half_car.signals import TopicData
 from pneumo_ros.diagnosis.result import Diagnosis
-from pneumo_ros.diagnosis.signals import TopicData
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError

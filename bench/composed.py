@@ -15,6 +15,7 @@ import numpy as np
 from kernel import PERIOD, STEPS, c_runner
 
 from pneumo_ros.effects.composition import CORRECTIONS
+from pneumo_ros.effects.parameters import is_law
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
@@ -36,7 +37,10 @@ def main() -> None:
     slots = model.slots
     typical = np.ones((len(slots), 2, max(slot.parameters for slot in slots)))
     for k, slot in enumerate(slots):
-        typical[k, :, : slot.parameters] = [p.typical for p in model.library[slot.name].parameters]
+        for effect in model.library.values():
+            if effect.term is not None and effect.place_in_kernel == slot.name:
+                columns = effect.columns or range(len(effect.parameters))
+                typical[k, :, list(columns)] = np.array([[p.typical] for p in effect.parameters])
 
     def composed(active: tuple[int, ...]) -> Callable[[], np.ndarray]:
         on = np.zeros((len(slots), 2), dtype=bool)
@@ -49,7 +53,8 @@ def main() -> None:
         "nominal": lambda: car.simulate(trim.state, commands, road, PERIOD),
         "composed, no effect": composed(()),
     }
-    for pair in combinations(range(len(slots)), 2):
+    laws = [k for k, slot in enumerate(slots) if slot.name in model.library and is_law(slot.name)]
+    for pair in combinations(laws, 2):
         runs[" + ".join(slots[k].name for k in pair)] = composed(pair)
     times: dict[str, list[float]] = {name: [] for name in runs}
     for number in range(rounds + 1):

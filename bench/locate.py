@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pneumo_ros.diagnosis.signals import read_signals
-from pneumo_ros.diagnosis.where import locate
+from pneumo_ros.diagnosis.half_car.signals import read_signals
+from pneumo_ros.diagnosis.half_car.where import locate
 from pneumo_ros.effects.rig_model import RigModel
 
 

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.half_car.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.diagnosis.search.competition import compete, run_pairs
 from pneumo_ros.diagnosis.search.selection import Scored, advantage, score
 from pneumo_ros.diagnosis.search.state import Effort, Search
-from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.effects.parameters import Active, is_law
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.files import new_file

@@ -29,11 +29,12 @@ def parse_yaml(text: str, where: object) -> Any:
     Raises
     ------
     InputError
-        if it is broken, too long, too deep, or has aliases.
+        if it is broken, too long, too deep, has aliases, or a name that stands twice in one table.
     """
     _check_length(text, where)
     try:
         _check_events(text, where)
+        _check_names(yaml.compose(text, Loader=_LOADER), where)
         return yaml.load(text, Loader=_LOADER)  # the safe loader: plain values only
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -81,6 +82,22 @@ def _check_events(text: str, where: object) -> None:
             raise _too("deep", where, depth, f"at most {MAX_DEPTH} levels")
         if entries > MAX_ENTRIES:
             raise _too("large", where, entries, f"at most {MAX_ENTRIES} entries")
+
+
+def _check_names(node: yaml.Node | None, where: object) -> None:
+    """Of two entries of one name YAML keeps the last, without a word."""
+    if isinstance(node, yaml.SequenceNode):
+        for one in node.value:
+            _check_names(one, where)
+    elif isinstance(node, yaml.MappingNode):
+        seen: set[str] = set()
+        for name, value in node.value:
+            if isinstance(name, yaml.ScalarNode):
+                if name.value in seen:
+                    raise InputError("a name stands twice", where=where, key=name.value,
+                                     value=f"line {name.start_mark.line + 1}", remedy="keep one of them")  # fmt: skip
+                seen.add(name.value)
+            _check_names(value, where)
 
 
 def _too(how: str, where: object, value: int, allowed: str) -> InputError:

@@ -52,6 +52,16 @@ def own_state(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
 
 
+def pytest_sessionstart() -> None:
+    """What numba kept of functions with an older law inside is thrown away: it looks at the caller's file alone."""
+    package = ROOT / "pneumo_ros"
+    latest = max(file.stat().st_mtime for file in (package / "laws").glob("*.py"))
+    for folder in ("laws", "effects", "slots", "own_rig"):
+        for kept in (package / folder).rglob("*.nbi"):
+            if kept.stat().st_mtime < latest:
+                kept.unlink(missing_ok=True)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Files with many slow tests come first, so that processes that share the files end together.
 

@@ -50,11 +50,12 @@ def fitted_half_car(
 def fitted_own(console: Console, against: Path, model: Path, rig: Path | None, pairs: bool) -> Iterator[Path]:
     """The rig file of one's own rig as a log has it."""
     from pneumo_ros.cli.diagnosis_shown import progress_bar
+    from pneumo_ros.cli.patience import answered
     from pneumo_ros.diagnosis.diagnose import Options
     from pneumo_ros.own_rig.from_files import prepared
     from pneumo_ros.own_rig.outputs import save_rig
 
-    task = prepared(model, [against], None, rig)
+    task = prepared(model, [against], None, rig, guard=answered(model))
     with progress_bar(console) as progress:
         bar = progress.add_task(f"fitting {against.name}", total=1.0)
         found = task.diagnose(Options(pairs=pairs), lambda share, what: progress.update(bar, completed=share))

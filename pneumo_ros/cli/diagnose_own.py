@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pneumo_ros.cli.diagnose_against import fitted_own
 from pneumo_ros.cli.existing import refuse_old_diagnosis
+from pneumo_ros.cli.patience import answered
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
@@ -50,7 +51,7 @@ def diagnose_own(
     with ExitStack() as held:
         if against is not None:
             rig = held.enter_context(fitted_own(console, against, model, rig, pairs))
-        task = prepared(model, fit, holdout, rig, without)
+        task = prepared(model, fit, holdout, rig, without, answered(model))
     kernel = task.model.physics.kernel
     threads = (os.cpu_count() or 1) if kernel.compiled and not kernel.alone else 1
     with progress_bar(console) as progress:

@@ -56,13 +56,13 @@ def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
 
 def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
     from pneumo_ros.cli.tables import simple_table
-    from pneumo_ros.diagnosis.report.words import structure_words
+    from pneumo_ros.diagnosis.report.words import ranking_words
 
-    rows = []
-    for entry in summary["ranking"][:SHOWN]:
+    rows, shown = [], summary["ranking"][:SHOWN]
+    for entry, words in zip(shown, ranking_words(shown), strict=True):
         lost = entry["gap_after"] is None or entry["shrink"] is None
         left = ("ran away", "") if lost else (f"{entry['gap_after']:.3g}", f"{100 * entry['shrink']:.1f} %")
-        rows.append((structure_words(entry), f"{entry['probability']:.2f}", *left))
+        rows.append((words, f"{entry['probability']:.2f}", *left))
     console.print(simple_table(("what competed", "probability", "gap left", "closed"), rows))
 
 

@@ -66,7 +66,7 @@ def _show(console: Console, effect: Effect) -> None:
         console.print(escape(effect.guide.meaning))
     console.print(f"\n[bold]acts at[/] {sites_of(effect)}; [bold]blamed on[/] {places_of(effect)}")
     if effect.id in SLOT_FAMILIES:
-        kind, family = SLOT_FAMILIES[effect.id]
+        kind, family, *_ = SLOT_FAMILIES[effect.id]
         console.print(f"[bold]at a rig of your own[/]: {family} at a slot of kind {kind} (--rig-model)")
     console.print(plain_table(("parameter", "typical", "from", "to", "unit", "what it is"), parameter_rows(effect)))
     if effect.guide is None:

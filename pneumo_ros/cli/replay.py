@@ -281,7 +281,7 @@ def _again(log: Log, given: Given) -> Rerun:
 def _diagnosed(log: Log, given: Given, path: Path) -> Rerun:
     """On the rig as diagnosed; the rig given is the one that the diagnosis was told, if it was told one."""
     from pneumo_ros.diagnosis.half_car.closed_loop import rerun_diagnosed
-    from pneumo_ros.diagnosis.signals import read_signals
+    from pneumo_ros.diagnosis.half_car.signals import read_signals
     from pneumo_ros.effects.configured import with_files
     from pneumo_ros.log.inspection import read_setups, seed_of
     from pneumo_ros.rig import load_rig

@@ -19,6 +19,7 @@ from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
 from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
 from pneumo_ros.diagnosis.judge.closable import Closable, EffectEvidence, closable
+from pneumo_ros.diagnosis.judge.effect_shares import effect_shares
 from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
@@ -32,7 +33,6 @@ from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.diagnosis.traits import HasLimits
-from pneumo_ros.diagnosis.where.effect_shares import effect_shares
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 

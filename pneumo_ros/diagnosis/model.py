@@ -24,7 +24,7 @@ class EffectLike(Protocol):
 
     @property
     def sites(self) -> tuple[str, ...]:
-        """Where it may act: "front", "rear", "both", "" (the whole rig), or a channel."""
+        """Where it may act, in the model's own words: a place, a channel, "both" of two, "" for the whole rig."""
 
     @property
     def parameters(self) -> tuple[EffectParameter, ...]: ...
@@ -71,7 +71,7 @@ class Model(Protocol):
         """Places of the rig that an effect at a site touches, first the one it is blamed on."""
 
     def side(self, active: Active) -> str | None:
-        """ "front", "rear", "both", or None where sides make no sense."""
+        """Which side of the rig that is, in the model's own words; None where sides make no sense."""
 
 
 @runtime_checkable

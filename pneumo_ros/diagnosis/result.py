@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.effects.parameters import Active, Curve
 from pneumo_ros.files import new_file
 
-ROAD_FILE: Final = "next_experiment_road.csv"  # name of a file beside the report [definition]
-VALVE_FILE: Final = "next_experiment_valves.csv"  # name of a file beside the report [definition]
 DIFFERS: Final = "differs"  # law of an effect whose shape is needed beside its law [definition]
 
 
@@ -53,7 +51,7 @@ class Ranked:
     ----------
     effects : ids; ("none",) for the nominal structure, ("unknown",) for what the library lacks
     sites : site of each effect
-    side : "front", "rear", "both" or None
+    side : of the rig, in the model's own words, or None
     probability : 0..1, the list sums to one
     parameters : by name (prefixed with the effect's id where two effects share a name)
     gap_after : held-out gap with it
@@ -172,49 +170,6 @@ def curve_json(curve: Curve | None) -> dict[str, Any] | None:
         return None
     axes = {key: {"name": axis.name, "unit": axis.unit} for key, axis in (("x", curve.x), ("y", curve.y))}
     return {**axes, "points": np.asarray(curve.points, dtype=float).tolist()}
-
-
-@dataclass(frozen=True)
-class Experiment(NextExperiment):
-    """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
-    apart.
-    """
-
-    time: Array  # (N,) s
-    road: Array  # (N, 2) m
-    valves: Array  # (N, 4) m2
-    kind: ClassVar[str] = "road and valve profiles"
-
-    def write(self, folder: Path) -> list[Path]:
-        """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""
-        columns_of = "time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2"
-        tables = {
-            ROAD_FILE: ("time_s,front_m,rear_m", self.road),
-            VALVE_FILE: (f"# interpolation: held\n{columns_of}", self.valves),
-        }
-        for name, (header, columns) in tables.items():
-            with new_file(folder / name) as part:
-                np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
-        return [folder / name for name in tables]
-
-    def command(self, folder: Path = Path()) -> str:
-        """What plays both tables of a folder."""
-        files = f"--road {folder / ROAD_FILE} --valves {folder / VALVE_FILE}"
-        step = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
-        return f"pneumo run {files} --duration {float(self.time[-1]) + step:g}"
-
-    def to_json(self) -> dict[str, Any]:
-        """Without the profile, which has files of its own."""
-        return {
-            "text": f"{self.aim}; {self.command()} plays it",
-            "command": self.command(),
-            "file": ROAD_FILE,
-            "valve_file": VALVE_FILE,
-            "name": self.name,
-            "description": self.description,
-            "separation": self.separation,
-            "separation_now": self.separation_now,
-        }
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from typing import Any, NamedTuple
 
 import numba
 
-from pneumo_ros.effects import hooks, kernel, oscillator
+from pneumo_ros import laws
+from pneumo_ros.effects import hooks, kernel
 from pneumo_ros.effects.cache import kept
 from pneumo_ros.plant import air_spring, equations, integrator, orifice
 from pneumo_ros.rig import channels
@@ -132,9 +133,10 @@ def _load(source: str, files: tuple[str, ...]) -> ModuleType:
 
 
 def _files(slots: Sequence[Slot]) -> list[str]:
-    modules = [hooks, kernel, oscillator, channels, air_spring, equations, integrator, orifice]
+    modules = [hooks, kernel, channels, air_spring, equations, integrator, orifice]
     functions = [f for slot in slots for f in slot.term.functions.values()]
-    return sorted({str(m.__file__) for m in modules} | {inspect.getsourcefile(f.py_func) or "" for f in functions})
+    called = {*laws.sources(), *(str(m.__file__) for m in modules)}
+    return sorted(called | {inspect.getsourcefile(f.py_func) or "" for f in functions})
 
 
 def _source(slots: Sequence[Slot]) -> str:

@@ -43,7 +43,7 @@ def files_of(path: Path) -> list[Path]:
         return [path]
     listed = _listed(path)
     there = sorted([*path.glob("*.mcap"), *path.glob("*.mcap.zstd")])
-    files = [path / name for name in listed] if listed else there
+    files = [path / name for name in listed] if listed else there or sorted(path.glob("*.db3"))
     if not files:
         raise InputError("the folder holds no .mcap file", where=path, remedy="give the folder that ros2 bag wrote")
     for file in files:

@@ -127,6 +127,9 @@ def _described(table: Mapping[str, Any], path: Path) -> Description:
     if not channels:
         raise InputError("no channel is named", where=path, key="channels", remedy="name what the log measured")
     inputs = _signals(table, "inputs", path)
+    both = next((name for name in channels if name in inputs), None)
+    if both is not None:
+        raise InputError("a channel and an input of one name", where=path, key=both, remedy="name them apart")
     parameters = {str(k): quantity(v, path, f"parameters.{k}") for k, v in _table(table, "parameters", path).items()}
     start, when = _starts_at(table.get("start", 0.0), channels, path)
     _check_names(path, channels, inputs, parameters, _table(table, "states", path))
@@ -200,8 +203,15 @@ def _signal(name: str, entry: Any, path: Path, key: str) -> SignalSpec:
                          allowed="[_x.mat, _y.mat]")  # fmt: skip
     pair = None if beside is None else (str(beside[0]), str(beside[1]))
     where = str(entry.get("field", name)), str(entry.get("topic", ""))
-    flags = bool(entry.get("hold")), bool(entry.get("drive"))
+    flags = _flag(entry, "hold", path, key), _flag(entry, "drive", path, key)
     return SignalSpec(name, *where, unit, factor * sign, offset * sign, noise, flags[0], pair, rate_of, flags[1])
+
+
+def _flag(entry: Mapping[str, Any], name: str, path: Path, key: str) -> bool:
+    found = entry.get(name, False)
+    if not isinstance(found, bool):
+        raise InputError("neither true nor false", where=path, key=f"{key}.{name}", value=found, allowed="true, false")
+    return found
 
 
 def _noise(entry: Any, factor: float, path: Path, key: str) -> float:

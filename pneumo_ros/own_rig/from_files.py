@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,12 @@ def rig_file_of(model: Path, rig: Path | None) -> Path:
 
 
 def prepared(
-    model: Path, fit: Sequence[Path], holdout: Path | None = None, rig: Path | None = None, without: Sequence[str] = ()
+    model: Path,
+    fit: Sequence[Path],
+    holdout: Path | None = None,
+    rig: Path | None = None,
+    without: Sequence[str] = (),
+    guard: AbstractContextManager[None] | None = None,
 ) -> OwnTask:
     """Read everything and build the model.
 
@@ -72,6 +78,7 @@ def prepared(
     model, rig : rig.py or model.fmu and its YAML; by default the one of the same name beside it
     fit, holdout : logs; without a held-out one the end of the last fitted one is held out
     without : families that do not compete
+    guard : around what runs the user's code for the first time
 
     Raises
     ------
@@ -85,7 +92,8 @@ def prepared(
         if name not in families:
             raise not_one_of("unknown family", name, families, key="without")
     description = read_description(rig_file_of(model, rig))
-    physics, description = _loaded(model, description)
+    with guard or nullcontext():
+        physics, description = _loaded(model, description)
     records = [read_record(path, description) for path in fit]
     notes = []
     if not physics.kernel.compiled:
@@ -101,8 +109,10 @@ def prepared(
         names = ", ".join(f"{one.effect} ({one.site})" for one in description.effects)
         notes.append(f"the rig file names {names}: part of the model as stated there; what competes is what the logs "
                      "show beyond it")  # fmt: skip
-    made = own_rig(description, physics, logs, without)
-    return OwnTask(made, tuple(logs), held, (*notes, *_of_another_order(made, logs)))
+    with np.errstate(all="ignore"):  # what is no number is refused in a line of its own
+        made = own_rig(description, physics, logs, without)
+        notes += _of_another_order(made, logs)
+    return OwnTask(made, tuple(logs), held, tuple(notes))
 
 
 def _of_another_order(model: OwnRig, records: Sequence[OwnRecord]) -> list[str]:

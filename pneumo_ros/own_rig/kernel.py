@@ -15,6 +15,7 @@ import inspect
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -22,6 +23,7 @@ import numpy as np
 from numba import njit
 from numba.core.errors import NumbaError
 
+from pneumo_ros import laws
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.cache import kept
 from pneumo_ros.own_rig import loop
@@ -141,7 +143,8 @@ def self_contained(source: str) -> bool:
 
 
 def _text(names: Names, states: bool, shape: Sequence[int], cached: bool, compiled: bool, source: str) -> str:
-    made_of = "".join([source, *(inspect.getsource(one) for one in (fo, fl))])
+    kernels = (Path(file).read_text(encoding="utf-8") for file in laws.sources())
+    made_of = "".join([source, *(inspect.getsource(one) for one in (fo, fl)), *kernels])
     kinds = {"State": names.states, "Inputs": names.inputs, "Parameters": names.parameters, "Acting": names.slots}
     x, u, p, f = (_packed(kind, fields, arg) for (kind, fields), arg in zip(kinds.items(), "xupf", strict=True))
     lines = ["from __future__ import annotations", "from collections import namedtuple", "from numba import njit"]

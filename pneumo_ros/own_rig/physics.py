@@ -7,21 +7,24 @@ import hashlib
 import importlib.util
 import inspect
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
 from numba import njit
 
 from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.own_rig.description import Description, usable_name
 from pneumo_ros.own_rig.kernel import Kernel, Names, build, tried
-from pneumo_ros.slots.kinds import IN_EQUATIONS, Slot
+from pneumo_ros.slots.kinds import IN_EQUATIONS, Force, Slot, zero
 from pneumo_ros.slots.library import families_of
 
 ARGUMENTS = 4  # x, u, p, f
+COORDINATE = 3  # x, u, p
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,9 @@ def load_physics(path: Path, rig: Description) -> Physics:
         kernel = build(names, rhs, outputs, [slot.coordinates for slot in inside], path.read_text("utf-8"))
         if not kernel.compiled:
             vars(module).update(helpers)
-            tried(kernel, names, len(inside))
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                tried(kernel, names, len(inside))
     except Exception as error:  # whatever the user's code raises is theirs to read, in one line
         raise InputError(f"the model fails: {type(error).__name__}: {_first(error)}", where=path,
                          remedy="check names, and that rhs and outputs return as many values as there are states and "
@@ -88,8 +93,9 @@ def _module(path: Path) -> ModuleType:
     kept, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise InputError(f"the file fails: {type(error).__name__}: {_first(error)}", where=path) from error
+    except (Exception, SystemExit) as error:  # sys.exit() would end a diagnosis that has not begun, with any code
+        raise InputError(f"the file fails: {type(error).__name__}: {_first(error)}", where=path,
+                         remedy="python rig.py shows where") from error  # fmt: skip
     finally:
         sys.dont_write_bytecode = kept
     return module
@@ -117,6 +123,8 @@ def _slots(module: ModuleType, path: Path, rig: Description) -> tuple[Slot, ...]
         raise InputError("no slots", where=path, key="SLOTS",
                          allowed="a list of Force, Contact, Flow, Input, Sensor")  # fmt: skip
     check_slots(slots, rig, path, "SLOTS")
+    for one in slots:
+        _check_coordinates(one, path, "SLOTS")
     return tuple(slots)
 
 
@@ -132,13 +140,24 @@ def check_slots(slots: Sequence[Slot], rig: Description, path: Path, key: str) -
     for one in slots:
         if places.count(one.place) > 1:
             raise InputError("two slots of one name", where=path, key=key, value=one.name, remedy="name them apart")
-        if not usable_name(one.name):
+        if not isinstance(one.name, str) or not usable_name(one.name):
             raise InputError("not a name that Python can use", where=path, key=key, value=one.name,
                              allowed="letters, digits and _")  # fmt: skip
         known = rig.channels if one.kind == "sensor" else rig.inputs
         if one.kind in ("input", "sensor") and one.name not in known:
             raise not_one_of(f"no such {one.kind}", one.name, known, where=path, key=key)
     _check_families(rig, slots)
+
+
+def _check_coordinates(one: Slot, path: Path, key: str) -> None:
+    for function in one.coordinates:
+        count = len(inspect.signature(function).parameters) if callable(function) else None
+        if count != COORDINATE:
+            raise InputError("a coordinate is no function of x, u, p", where=path, key=key, value=one.name,
+                             allowed="travel=lambda x, u, p: x.position")  # fmt: skip
+    if isinstance(one, Force) and one.rate is zero and one.travel is zero:
+        raise InputError("a force without rate and travel", where=path, key=key, value=one.name,
+                         allowed="rate=lambda x, u, p: x.speed, travel=lambda x, u, p: x.position")  # fmt: skip
 
 
 def _check_families(rig: Description, slots: Sequence[Slot]) -> None:

@@ -19,6 +19,8 @@ from pneumo_ros.own_rig.clocks import on_one_clock
 from pneumo_ros.own_rig.description import Description, SignalSpec
 from pneumo_ros.own_rig.tables import Sampled, sampled
 
+COARSE = 1e-9  # of an interval, to which a time must be told
+LARGEST = 1e100  # beyond it squares are no numbers
 FEWEST = 40  # rows below which nothing can be said
 MOST = 400_000
 GAP = 2.5  # median intervals that interpolation bridges
@@ -132,10 +134,18 @@ def _source(spec: SignalSpec, held: dict[str, Sampled], rig: Description) -> str
 
 def _clean(one: Sampled, path: Path, spec: SignalSpec) -> Sampled:
     """Samples that are numbers, their times increasing."""
-    kept = np.isfinite(one.time) & np.isfinite(one.values)
+    numbers = np.isfinite(one.time)
+    if len(numbers) and not numbers.any():
+        raise InputError("too few samples whose time is a number", where=path, key="time", value=0,
+                         allowed="seconds, or dates such as 2026-03-01 10:15:30.25")  # fmt: skip
+    kept = numbers & np.isfinite(one.values)
     if np.count_nonzero(kept) < FEWEST:
-        raise InputError("too few samples", where=path, key=spec.name, value=int(np.count_nonzero(kept)),
-                         allowed=f"at least {FEWEST}", remedy="record longer")  # fmt: skip
+        raise InputError("too few samples that are numbers", where=path, key=spec.name,
+                         value=f"{np.count_nonzero(kept)} of {len(kept)} rows", allowed=f"at least {FEWEST}",
+                         remedy="record longer, or check the field")  # fmt: skip
+    if np.max(np.abs(one.values[kept])) > LARGEST:
+        raise InputError("a value beyond any measurement", where=path, key=spec.name,
+                         value=float(np.max(np.abs(one.values[kept]))), allowed=f"up to {LARGEST:g}")  # fmt: skip
     time, values = one.time[kept], one.values[kept]
     received = None if one.received is None else one.received[kept]
     later = np.concatenate([[True], np.diff(np.maximum.accumulate(time)) > 0.0])
@@ -146,7 +156,7 @@ def _clean(one: Sampled, path: Path, spec: SignalSpec) -> Sampled:
 
 def _base(path: Path, rig: Description, held: dict[str, Sampled]) -> Array:
     """Uniform times of the rows: of the fastest channel, where every signal is there."""
-    intervals = {name: float(np.median(np.diff(held[name].time))) for name in rig.channels}
+    intervals = {name: _interval(held[name].time) for name in rig.channels}
     period = min(intervals.values())
     first = max(one.time[0] for one in held.values()) + rig.start
     last = min(one.time[-1] for one in held.values()) - rig.end
@@ -159,6 +169,13 @@ def _base(path: Path, rig: Description, held: dict[str, Sampled]) -> Array:
     if rows > MOST:
         raise InputError("too many rows", where=path, value=rows, allowed=f"up to {MOST}", remedy="cut the log")
     return np.asarray(first + period * np.arange(rows))
+
+
+def _interval(time: Array) -> float:
+    """Median interval, s; of times since 1970, whose steps are told to 0.2 us only, as the whole log has it."""
+    median, told = float(np.median(np.diff(time))), float(np.spacing(np.abs(time).max()))
+    mean = float(time[-1] - time[0]) / (len(time) - 1)
+    return mean if told > COARSE * median and abs(mean - median) <= told else median
 
 
 def begins(one: Sampled, noise: float | None) -> float:

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Laws and atoms of a flow slot: leaks, errors of an orifice, relief, droop, heat; as :mod:`pneumo_ros.slots.force`.
 
-``c`` are the coordinates (pressure or level up, down, nominal flow). A gas chokes: its flow through a hole goes with
-the upper pressure alone below the critical ratio (ISO 6358); through a long gap it goes with the difference of squares.
+``c`` are the coordinates (pressure or level up, down, nominal flow). What each law does is in :mod:`pneumo_ros.laws`.
 
 Kernel arguments
 ----------------
 c, z, P, S : coordinates (3,), memories (MEMORIES,), values of all laws and atoms (VALUES,), scales (SCALES,)
-up, down, scale : pressures or levels on both sides, and the one that a gas's gap is stated at, in the slot's unit
-gas : whether it chokes; a liquid does not
 h, since : a step, and time since the log began, s
 """
 
@@ -20,8 +17,8 @@ import numpy as np
 from numba import njit
 
 from pneumo_ros.arrays import Array
-
-CRITICAL = 0.528  # pressure ratio below which air chokes
+from pneumo_ros.laws.flow import in_excess, relieved, settling, through_gap, through_hole, through_opening
+from pneumo_ros.laws.memory import relaxed
 
 # Laws: columns of P.
 HOLE, GAP = 0, 1
@@ -53,32 +50,6 @@ MEMORIES = 9
 
 
 @njit(cache=True, error_model="numpy")
-def through_hole(up: float, down: float, gas: bool) -> float:
-    """Flow through a hole over that of the same hole at an upper pressure of one with nothing behind it."""
-    if down > up:
-        return -through_hole(down, up, gas)
-    if not gas:
-        return math.sqrt(up - down)
-    if up <= 0.0:
-        return 0.0
-    ratio = down / up
-    if ratio <= CRITICAL:
-        return up
-    r = (ratio - CRITICAL) / (1.0 - CRITICAL)
-    # Linear within 0.1 % of balance, where the root's slope would be infinite.
-    if ratio > 0.999:
-        edge = (0.999 - CRITICAL) / (1.0 - CRITICAL)
-        return up * math.sqrt(1.0 - edge * edge) * (1.0 - ratio) / 0.001
-    return up * math.sqrt(1.0 - r * r)
-
-
-@njit(cache=True, error_model="numpy")
-def through_gap(up: float, down: float, gas: bool, scale: float) -> float:
-    """Laminar flow, in the pressure's unit: the difference, of a gas times the mean pressure over a scale."""
-    return (up - down) * (0.5 * (up + down) / scale if gas else 1.0)
-
-
-@njit(cache=True, error_model="numpy")
 def start(c: Array, z: Array, since: float, P: Array, S: Array) -> None:
     """Memories at the flow; decays as far on as the record's first row is from the log's."""
     for k in range(3):
@@ -93,9 +64,9 @@ def start(c: Array, z: Array, since: float, P: Array, S: Array) -> None:
 def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
     """Memories one step of ``h`` s later."""
     for k in range(3):
-        z[Z_FLOW + k] = c[2] + (z[Z_FLOW + k] - c[2]) * math.exp(-h / S[S_TIMES + k])
+        z[Z_FLOW + k] = relaxed(z[Z_FLOW + k], c[2], h, S[S_TIMES + k])
     if P[DROOP] != 0.0:
-        z[Z_DROOP] = c[2] + (z[Z_DROOP] - c[2]) * math.exp(-h / P[DROOP_TIME])
+        z[Z_DROOP] = relaxed(z[Z_DROOP], c[2], h, P[DROOP_TIME])
     if P[HEAT] != 0.0:
         z[Z_HEAT] *= math.exp(-h / P[HEAT_TIME])
     for k in range(4):
@@ -108,21 +79,19 @@ def flow(c: Array, z: Array, P: Array, S: Array) -> float:
     up, down, nominal = c[0], c[1], c[2]
     gas = S[S_GAS] > 0.5
     hole, gap, share = through_hole(up, down, gas), through_gap(up, down, gas, S[S_UP]), nominal / S[S_FLOW]
-    out = P[HOLE] * hole + P[GAP] * gap + nominal * (P[FLOW] + P[FLOW_SQUARE] * abs(share))
+    out = P[HOLE] * hole + P[GAP] * gap + in_excess(nominal, P[FLOW] + P[FLOW_SQUARE] * abs(share), 0.0, 0.0)
     out += (
-        P[RELIEF] * max(0.0, up - (S[S_LOW] + S[S_SWING] - P[RELIEF_DEPTH]))
-        - P[DROOP] * nominal * z[Z_DROOP] / S[S_FLOW]
+        P[RELIEF] * relieved(up, S[S_LOW] + S[S_SWING] - P[RELIEF_DEPTH]) - P[DROOP] * nominal * z[Z_DROOP] / S[S_FLOW]
     )
     if P[POWER] != 0.0:
-        d = up - down
-        out += P[POWER] * d * (abs(d) / S[S_UP] + 1e-9) ** (P[EXPONENT] - 1.0)
+        out += P[POWER] * through_opening(up, down, S[S_UP], P[EXPONENT])
     if P[HEAT] != 0.0:
-        out += P[HEAT] * z[Z_HEAT] / P[HEAT_TIME]
+        out += P[HEAT] * settling(z[Z_HEAT], P[HEAT_TIME])
     out += P[STEADY] + P[A_HOLE] * hole + P[A_GAP] * gap
     for k in range(4):
-        over = max(0.0, up - S[S_ABOVE + k])
+        over = relieved(up, S[S_ABOVE + k])
         out += P[OPENS + k] * hole * over / S[S_SWING] + P[RELIEFS + k] * over
-        out += P[HEATS + k] * z[Z_HEATS + k] / S[S_HEATS + k]
+        out += P[HEATS + k] * settling(z[Z_HEATS + k], S[S_HEATS + k])
     level = (up - S[S_LOW]) / S[S_SWING]
     out += nominal * (P[A_FLOW] + P[A_FLOW + 1] * abs(share) + P[A_FLOW + 2] * (down / up if up > 0.0 else 0.0))
     out += nominal * P[A_FLOW + 3] * level

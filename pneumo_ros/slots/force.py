@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Laws and atoms of a force slot, evaluated together: coordinates, memories, values and scales in, force out.
+"""Laws and atoms of a force slot, evaluated together: coordinates, memories, values and scales in, force out. What each
+law does is in :mod:`pneumo_ros.laws`.
 
 ``c`` are the coordinates (travel, rate, load), ``z`` the memories, ``P`` the values of all laws and atoms (0: absent;
 the columns are named here), ``S`` the slot's scales. What opposes a motion is negative at positive rate. Memories move
@@ -11,18 +12,20 @@ Kernel arguments
 c, z, P, S : coordinates (3,), memories (MEMORIES,), values of all laws and atoms (VALUES,), scales (SCALES,)
 x, v, load : the coordinates: travel, its rate, and what presses, in the slot's units
 h : a step, s
-value, limit : any unit
-z, moved, growth : of :func:`bouc_wen`: its memory, what the travel has moved, and how its force goes on
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numba import njit
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.laws.contact import in_play, missing_pull, stop
+from pneumo_ros.laws.damping import degressive, linear, one_sided, squared
+from pneumo_ros.laws.friction import clipped, slid, stribeck, turned
+from pneumo_ros.laws.hysteresis import moved_on
+from pneumo_ros.laws.memory import relaxed
+from pneumo_ros.laws.ringing import pulled
 
 # Laws: columns of P.
 COULOMB = 0
@@ -75,12 +78,6 @@ THREE = (0.4, 1.0, 2.5)  # slacks of the parallel sliders, in their mean
 
 
 @njit(cache=True, error_model="numpy")
-def clipped(value: float, limit: float) -> float:
-    """A value inside plus and minus a limit."""
-    return min(max(value, -limit), limit)
-
-
-@njit(cache=True, error_model="numpy")
 def start(c: Array, z: Array, S: Array) -> None:
     """Sliders free of force, memories at the travel, an attached mass at rest on its spring."""
     z[:] = 0.0
@@ -92,49 +89,27 @@ def start(c: Array, z: Array, S: Array) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def bouc_wen(z: float, moved: float, growth: float) -> float:
-    """Memory after a monotonic move, exact: z' = 1 - z sign(moved) + growth |z| with respect to the move (Wen 1976,
-    J. Eng. Mech. Div. 102, 249-263; growth = -delta / gamma of z' = alpha v - beta (gamma |v| z + delta v |z|)).
-
-    ``moved`` : in yield travels; ``growth`` : above -1; from 1 on the force grows without end
-    """
-    side, left = (1.0, moved) if moved > 0.0 else (-1.0, -moved)
-    if z * side < 0.0:  # on its way back to nothing
-        fall = 1.0 + growth
-        until = math.log(1.0 + fall * abs(z)) / fall
-        if left <= until:
-            return side / fall + (z - side / fall) * math.exp(-fall * left)
-        z, left = 0.0, left - until
-    rise = 1.0 - growth
-    if abs(rise) < 1e-9:
-        return z + side * left
-    return side / rise + (z - side / rise) * math.exp(-rise * left)
-
-
-@njit(cache=True, error_model="numpy")
 def advance(c: Array, z: Array, h: float, P: Array, S: Array) -> None:
     """Memories one step of ``h`` s later; ``c`` at its end."""
     moved = c[0] - z[Z_BEFORE]
     z[Z_BEFORE] = c[0]
     if P[ATOMS_AT_WORK] != 0.0:
         for k in range(5):
-            z[Z_SLID + k] = clipped(z[Z_SLID + k] + moved / S[S_SLACKS + k], 1.0)
+            z[Z_SLID + k] = slid(z[Z_SLID + k], moved / S[S_SLACKS + k])
         for k in range(3):
             if P[LAGGED + k] != 0.0:
-                z[Z_LAGGED + k] = c[0] + (z[Z_LAGGED + k] - c[0]) * math.exp(-h / S[S_TIMES + k])
+                z[Z_LAGGED + k] = relaxed(z[Z_LAGGED + k], c[0], h, S[S_TIMES + k])
     if P[PRESLIDING] != 0.0:
-        z[Z_PRE] = clipped(z[Z_PRE] + moved / P[PRESLIDING_TRAVEL], 1.0)
+        z[Z_PRE] = slid(z[Z_PRE], moved / P[PRESLIDING_TRAVEL])
     if P[BOUC_WEN] != 0.0:
-        z[Z_BOUC] = bouc_wen(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
+        z[Z_BOUC] = moved_on(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
     if P[SLIDERS] != 0.0:
         for k in range(3):
-            z[Z_THREE + k] = clipped(z[Z_THREE + k] + moved / (THREE[k] * P[SLIDERS_TRAVEL]), 1.0)
+            z[Z_THREE + k] = slid(z[Z_THREE + k], moved / (THREE[k] * P[SLIDERS_TRAVEL]))
     if P[MEMORY] != 0.0:
-        z[Z_MEMORY] = c[0] + (z[Z_MEMORY] - c[0]) * math.exp(-h / P[MEMORY_TIME])
+        z[Z_MEMORY] = relaxed(z[Z_MEMORY], c[0], h, P[MEMORY_TIME])
     if P[MASS] != 0.0:
-        w, d = P[FREQUENCY], P[DAMPING_RATIO]
-        pull = w * w * (c[0] - z[Z_MASS]) + 2.0 * d * w * (c[1] - z[Z_MASS + 1])
-        z[Z_MASS + 1] += h * pull
+        z[Z_MASS + 1] += h * pulled(c[0] - z[Z_MASS], c[1] - z[Z_MASS + 1], P[FREQUENCY], P[DAMPING_RATIO], 1.0)
         z[Z_MASS] += h * z[Z_MASS + 1]
 
 
@@ -150,24 +125,23 @@ def force(c: Array, z: Array, P: Array, S: Array) -> float:
 def _friction(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> float:
     if not P[: LOADED + 1].any():
         return 0.0
-    turned = math.tanh(v / S[S_TURNOVER])
-    out = -(P[COULOMB] + P[LOADED] * abs(load)) * turned
+    way = turned(v, S[S_TURNOVER])
+    out = -(P[COULOMB] + P[LOADED] * abs(load)) * way
     if P[STRIBECK] != 0.0:
-        r = v / P[STRIBECK_RATE]
-        out -= P[STRIBECK] * (1.0 + P[STRIBECK_EXTRA] * math.exp(-r * r)) * turned
+        out -= P[STRIBECK] * stribeck(v, P[STRIBECK_RATE], P[STRIBECK_EXTRA]) * way
     if P[SOFT] != 0.0:
-        out -= P[SOFT] * math.tanh(v / P[SOFT_RATE])
+        out -= P[SOFT] * turned(v, P[SOFT_RATE])
     if P[PRESLIDING] != 0.0:
-        out -= P[PRESLIDING] * clipped(z[Z_PRE] + (x - z[Z_BEFORE]) / P[PRESLIDING_TRAVEL], 1.0)
-    return out - (P[ONE_SIDED_OUT] if v > 0.0 else P[ONE_SIDED_IN]) * turned
+        out -= P[PRESLIDING] * slid(z[Z_PRE], (x - z[Z_BEFORE]) / P[PRESLIDING_TRAVEL])
+    return out - (P[ONE_SIDED_OUT] if v > 0.0 else P[ONE_SIDED_IN]) * way
 
 
 @njit(cache=True, error_model="numpy")
 def _damping(v: float, P: Array) -> float:
-    out = -P[VISCOUS] * v - P[SQUARE_DAMPING] * v * abs(v)
-    out -= (P[DAMPING_OUT] if v > 0.0 else P[DAMPING_IN]) * v
+    out = -linear(v, P[VISCOUS]) - squared(v, P[SQUARE_DAMPING])
+    out -= one_sided(v, P[DAMPING_OUT], P[DAMPING_IN])
     if P[DEGRESSIVE] != 0.0:
-        out -= P[DEGRESSIVE] * v / (1.0 + abs(v) / P[DEGRESSIVE_RATE])
+        out -= degressive(v, P[DEGRESSIVE], P[DEGRESSIVE_RATE])
     return out
 
 
@@ -175,24 +149,23 @@ def _damping(v: float, P: Array) -> float:
 def _elastic(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> float:
     out, moved = P[CONSTANT], x - z[Z_BEFORE]
     if P[BOUC_WEN] != 0.0:
-        out -= P[BOUC_WEN] * bouc_wen(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
+        out -= P[BOUC_WEN] * moved_on(z[Z_BOUC], moved / P[BOUC_WEN_TRAVEL], P[BOUC_WEN_GROWTH])
     if P[SLIDERS] != 0.0:
         for k in range(3):
-            out -= P[SLIDERS] / 3.0 * clipped(z[Z_THREE + k] + moved / (THREE[k] * P[SLIDERS_TRAVEL]), 1.0)
+            out -= P[SLIDERS] / 3.0 * slid(z[Z_THREE + k], moved / (THREE[k] * P[SLIDERS_TRAVEL]))
     below, above = S[S_BELOW] + P[STOP_BELOW_DEPTH], S[S_ABOVE] - P[STOP_ABOVE_DEPTH]
     if P[STOP_BELOW] != 0.0 and x < below:
-        out += max(0.0, P[STOP_BELOW] * (below - x) * (1.0 - P[STOP_BELOW_LOSS] * v / S[S_RATE]))
+        out += stop(below - x, P[STOP_BELOW], 0.0, -P[STOP_BELOW_LOSS] * v / S[S_RATE])
     if P[STOP_ABOVE] != 0.0 and x > above:
-        out -= max(0.0, P[STOP_ABOVE] * (x - above) * (1.0 + P[STOP_ABOVE_LOSS] * v / S[S_RATE]))
+        out -= stop(x - above, P[STOP_ABOVE], 0.0, P[STOP_ABOVE_LOSS] * v / S[S_RATE])
     d = x - S[S_MIDDLE]
     out -= P[SPRING] * d + P[SPRING_CUBIC] * d * d * d + P[SPRING_SQUARE] * d * d
     if P[BACKLASH] != 0.0:
-        out += P[BACKLASH] * clipped(x, P[BACKLASH_HALF])
+        out += P[BACKLASH] * in_play(x, P[BACKLASH_HALF])
     if P[MASS] != 0.0:
-        w = P[FREQUENCY]
-        out -= P[MASS] * (w * w * (x - z[Z_MASS]) + 2.0 * P[DAMPING_RATIO] * w * (v - z[Z_MASS + 1]))
+        out -= P[MASS] * pulled(x - z[Z_MASS], v - z[Z_MASS + 1], P[FREQUENCY], P[DAMPING_RATIO], 1.0)
     out -= P[MEMORY] * (x - z[Z_MEMORY])
-    return out - P[PULL] * min(load, 0.0)
+    return out + missing_pull(load, P[PULL])
 
 
 @njit(cache=True, error_model="numpy")
@@ -209,7 +182,7 @@ def _atoms(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> flo
         out -= P[LINES + 1] * v - P[LINES + 3] * v * v
     out -= P[LOAD_RAMP] * abs(load) / S[S_LOAD] * clipped(v / S[S_RATES + 1], 1.0)
     for k in range(5):
-        out -= P[SLID + k] * clipped(z[Z_SLID + k] + (x - z[Z_BEFORE]) / S[S_SLACKS + k], 1.0)
+        out -= P[SLID + k] * slid(z[Z_SLID + k], (x - z[Z_BEFORE]) / S[S_SLACKS + k])
     for k in range(STEPS):
         out += P[BELOW + k] * max(0.0, S[S_BELOW + k] - x) - P[ABOVE + k] * max(0.0, x - S[S_ABOVE + k])
     if x < S[S_BELOW + 1]:
@@ -220,7 +193,7 @@ def _atoms(x: float, v: float, load: float, z: Array, P: Array, S: Array) -> flo
     q = d / S[S_SWING]
     out -= P[POWERS] * d + P[POWERS + 1] * d * q + P[POWERS + 2] * d * q * q
     for k in range(3):
-        out += P[CENTRE + k] * clipped(x, S[S_CENTRE + k])
+        out += P[CENTRE + k] * in_play(x, S[S_CENTRE + k])
         out -= P[LAGGED + k] * (x - z[Z_LAGGED + k])
     return out
 

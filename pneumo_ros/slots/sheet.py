@@ -35,13 +35,19 @@ def _by_hand() -> str:
 
 
 def _half_car() -> str:
-    """Which family an effect of the half car is at a slot."""
-    rows = [f"| `{effect}` | {kind} | `{family}` |" for effect, (kind, family) in SLOT_FAMILIES.items()]
+    """Which family an effect of the half car is at a slot, and what the two share."""
+    rows = [
+        f"| `{effect}` | {one.kind} | `{one.family}` | {', '.join(f'`{law}`' for law in one.laws) or '-'} "
+        f"| {one.differs or '-'} |"
+        for effect, one in SLOT_FAMILIES.items()
+    ]
     others = ", ".join(f"`{effect}`" for effect in PARAMETERS_OF_THE_EQUATIONS)
     return (
         "## The half car's effects\n\n"
-        "What [effects.md](effects.md) calls by the half car's parts, at a rig of your own:\n\n"
-        "| effect | kind of slot | family |\n|---|---|---|\n"
+        "What [effects.md](effects.md) calls by the half car's parts, at a rig of your own. What a law does is written "
+        "once, in `pneumo_ros/laws/`; the half car's effect and the family's laws are made of the functions named "
+        "here. The last column says where the half car goes on differently, and why.\n\n"
+        "| effect | kind of slot | family | shared | what is different at the half car |\n|---|---|---|---|---|\n"
         + "\n".join(rows)
         + f"\n\nNot at a slot: {others}. They are "
         "parameters of the equations, which a rig of your own states with a tolerance.\n"

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.filters import first_order_line, played, slewed
+from pneumo_ros.laws.filters import delayed_line, first_order_line, lagged_line, play, slewed
+from pneumo_ros.laws.signal import bent, crept, dead, scaled_about
 
 # Laws: columns of P.
 GAIN, OFFSET, SQUARE, CUBE = 0, 1, 2, 3
@@ -18,6 +19,7 @@ LAG, SECOND_LAG, DELAY = 4, 5, 6
 DEAD, CUT, SOFT_CUT, PLAY = 7, 8, 9, 10
 SLOWNESS = 11  # s for each unit: the rate it cannot exceed, turned over
 LAWS = 12
+CRITICAL = 1.0  # damping ratio of a lag's two equal poles
 
 # Atoms.
 POWERS = LAWS  # constant, linear, square, cube
@@ -36,24 +38,18 @@ S_CREEPS = 19
 SCALES = 23
 
 
-def lagged(u: Array, period: float, lag: float) -> Array:
+def _lagged(u: Array, period: float, lag: float) -> Array:
     """First order lag of a linearly interpolated signal that has rested at its first value."""
     return first_order_line(np.ascontiguousarray(u), period, lag)[0]
-
-
-def delayed(u: Array, period: float, delay: float) -> Array:
-    """The signal ``delay`` s late, resting at its first value before."""
-    rows = np.arange(len(u))
-    return np.asarray(np.interp(rows - delay / period, rows, u))
 
 
 def _static(u: Array, P: Array, S: Array) -> Array:
     """What the value alone decides."""
     q = (u - S[S_MIDDLE]) / S[S_SWING]
-    out = u + P[GAIN] * u + P[OFFSET] + S[S_SWING] * (P[SQUARE] * q * q + P[CUBE] * q**3)
-    out += S[S_SWING] * sum(P[POWERS + k] * q**k for k in range(4))
+    out = scaled_about(u, P[GAIN], 0.0) + P[OFFSET] + S[S_SWING] * bent(q, (2, 3), (P[SQUARE], P[CUBE]))
+    out += S[S_SWING] * bent(q, range(4), P[POWERS:CORNERS].tolist())
     if P[DEAD] != 0.0:
-        out -= np.clip(u, -P[DEAD], P[DEAD])
+        out -= dead(u, P[DEAD])
     if P[CUT] != 0.0:
         limit = S[S_PEAK] * (1.0 - P[CUT])
         out = np.clip(out, -limit, limit)
@@ -61,7 +57,7 @@ def _static(u: Array, P: Array, S: Array) -> Array:
         out = out / (1.0 + P[SOFT_CUT] * (out / S[S_PEAK]) ** 2)
     for k in range(3):
         if P[CORNERS + k] != 0.0:
-            out -= P[CORNERS + k] * np.clip(u, -S[S_DEAD + k], S[S_DEAD + k])
+            out -= P[CORNERS + k] * dead(u, S[S_DEAD + k])
         if P[LIMITS + k] != 0.0:
             out -= P[LIMITS + k] * (u - np.clip(u, -S[S_LIMITS + k], S[S_LIMITS + k]))
     return np.asarray(out)
@@ -76,20 +72,20 @@ def passed(u: Array, period: float, P: Array, S: Array) -> Array:
 def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
     out = _static(u, P, S)
     if P[PLAY] != 0.0:
-        out = played(out, P[PLAY], out[0])
+        out = play(out, P[PLAY])[0]
     if P[SLOWNESS] != 0.0:
         out = slewed(out, period / P[SLOWNESS])
     if P[LAG] != 0.0:
-        out = lagged(out, period, P[LAG])
+        out = _lagged(out, period, P[LAG])
     if P[SECOND_LAG] != 0.0:
-        out = lagged(lagged(out, period, P[SECOND_LAG]), period, P[SECOND_LAG])
+        out = lagged_line(out, period, P[SECOND_LAG], CRITICAL)[0]
     if P[DELAY] != 0.0:
-        out = delayed(out, period, P[DELAY])
+        out = delayed_line(out, period, P[DELAY])
     shared = np.zeros_like(out)
     for first, count, scale, way in (
-        (PLAYS, 3, S_PLAYS, lambda s: played(out, s, out[0])),
-        (LAGS, 4, S_LAGS, lambda s: lagged(out, period, s)),
-        (DELAYS, 3, S_DELAYS, lambda s: delayed(out, period, s)),
+        (PLAYS, 3, S_PLAYS, lambda s: play(out, s)[0]),
+        (LAGS, 4, S_LAGS, lambda s: _lagged(out, period, s)),
+        (DELAYS, 3, S_DELAYS, lambda s: delayed_line(out, period, s)),
     ):
         for k in range(count):
             if P[first + k] != 0.0:
@@ -99,12 +95,12 @@ def _passed(u: Array, period: float, P: Array, S: Array) -> Array:
 
 def _crept(rows: int, period: float, P: Array, S: Array) -> Array:
     """How far the zero has moved since the log began, from where it stood then."""
-    time = np.arange(rows) * period
-    crept = np.zeros(rows)
+    time = np.arange(rows, dtype=float) * period
+    moved = np.zeros(rows)
     for k in range(4):
         if P[CREEPS + k] != 0.0:
-            crept -= P[CREEPS + k] * np.expm1(-time / S[S_CREEPS + k])
-    return crept
+            moved += P[CREEPS + k] * crept(time, float(S[S_CREEPS + k]))
+    return moved
 
 
 def undone(y: Array, P: Array, S: Array, rounds: int = 8) -> Array:

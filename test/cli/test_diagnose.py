@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from pneumo_ros.cli.diagnose import _bench, app
 from pneumo_ros.diagnosis.half_car.from_logs import prepared
-from pneumo_ros.diagnosis.signals import read_signals
+from pneumo_ros.diagnosis.half_car.signals import read_signals
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel

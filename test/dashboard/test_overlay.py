@@ -14,8 +14,8 @@ from helpers.small_logs import STRING, text, write
 
 from pneumo_ros.dashboard.overlay import CHANNELS, Overlay, is_residual, remainders, series_of
 from pneumo_ros.dashboard.source import Playback
+from pneumo_ros.diagnosis.half_car.signals import read_signals
 from pneumo_ros.diagnosis.report.residual_log import write_residual_log
-from pneumo_ros.diagnosis.signals import read_signals
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.rig import load_rig

@@ -18,9 +18,9 @@ from pneumo_ros.daq.emulator.simulation import RigSimulation, SimulationSettings
 from pneumo_ros.diagnosis.diagnose import Options
 from pneumo_ros.diagnosis.half_car.from_logs import prepared
 from pneumo_ros.diagnosis.half_car.saved_rig import corrected_rig, save_corrected_rig
+from pneumo_ros.diagnosis.half_car.signals import Signals, check_pair
 from pneumo_ros.diagnosis.judge.held_out_runs import held_out
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap
-from pneumo_ros.diagnosis.signals import Signals, check_pair
 from pneumo_ros.effects import library
 from pneumo_ros.effects.corrected_rig import CorrectedRig, diagnosed_rig
 from pneumo_ros.effects.loading import load_library

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from helpers.rig_logs import signals_of, simulated
 
-from pneumo_ros.diagnosis.signals import Signals
-from pneumo_ros.effects.filters import delayed_hold, first_order_line, lagged_hold, lagged_line
+from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import ANYTHING, Active, family_of, is_law
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
+from pneumo_ros.laws.filters import delayed_hold, first_order_line, lagged_hold, lagged_line
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 

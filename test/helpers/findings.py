@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from helpers.rig_logs import signals_of, simulated
+from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.report import Findings
-from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.effects.loading import load_library
 
 PLACES = (

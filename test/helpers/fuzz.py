@@ -24,7 +24,7 @@ from pneumo_ros.cli.session_plan import node_tables
 from pneumo_ros.daq.calibration_file import load_calibration
 from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.dashboard.source import Playback
-from pneumo_ros.diagnosis.signals import read_signals
+from pneumo_ros.diagnosis.half_car.signals import read_signals
 from pneumo_ros.errors import PneumoError
 from pneumo_ros.log.comparison import compare
 from pneumo_ros.log.conformance import check_conformance

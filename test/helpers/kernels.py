@@ -20,7 +20,7 @@ from pneumo_ros.casemaker.parameters import richer_rig
 from pneumo_ros.casemaker.scene import Scene, play
 from pneumo_ros.control.half_car import build_controller
 from pneumo_ros.control.loop import close_loop
-from pneumo_ros.diagnosis.where import locate
+from pneumo_ros.diagnosis.half_car.where import locate
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.stepping import stepped_rig
 from pneumo_ros.estimation.half_car import build_estimator

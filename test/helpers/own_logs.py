@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from helpers.rig_logs import excitation, signals_of, simulated
+from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.diagnosis.search.state import Effort
-from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim

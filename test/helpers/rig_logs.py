@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
-from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
+from pneumo_ros.diagnosis.half_car.signals import COMMANDS, MEASURED, ROADS, Signals, TopicData, prepare
 from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
 from pneumo_ros.log.topics import COMMAND, DISPLACEMENT, FRONT_PRESSURE, JOINT, REAR_PRESSURE, ROAD, STRING
 from pneumo_ros.log.writing import LogWriter

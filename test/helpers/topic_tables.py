@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pneumo_ros.diagnosis.signals import Signals, TopicData
+from pneumo_ros.diagnosis.half_car.signals import Signals, TopicData
 
 Topics = dict[str, TopicData]
 DISPLACEMENT, ROAD, VALVE = "/rig/displacement", "/road/profile", "/valve/command"

@@ -44,6 +44,9 @@ def test_the_page_names_the_friction_of_its_rail(followed: Path) -> None:
     curve = np.array(found["budget"][0]["curve"]["points"])
     fast = curve[np.abs(curve[:, 0]) > 0.3 * np.abs(curve[:, 0]).max()]
     assert np.allclose(np.abs(fast[:, 1]), 1.5, atol=0.3) and np.all(fast[:, 1] * fast[:, 0] < 0.0)
+    told = re.search(r"friction force ([\d.]+) ± ([\d.]+) N", (ROOT / "docs/your-rig.md").read_text(encoding="utf-8"))
+    size = found["ranking"][0]["parameters"]["friction_force"]
+    assert told is not None and abs(size["value"] - float(told[1])) < float(told[2]), "what the page shows"
     page = (followed / "found" / "report.html").read_text()
     assert (
         "cart on a spring" in page and "rail" in page and (followed / "found" / "residual.mcap").stat().st_size > 1000

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from pneumo_ros.cli.main import app
 from pneumo_ros.control.half_car import CONTROLLERS, build_controller
 from pneumo_ros.control.profile import ProfilePlayer, build_commander
-from pneumo_ros.diagnosis.result import ROAD_FILE, VALVE_FILE, Experiment
+from pneumo_ros.diagnosis.half_car.experiment import ROAD_FILE, VALVE_FILE, Experiment
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.inspection import read_setups
 from pneumo_ros.log.reading import read_log

@@ -15,7 +15,7 @@ carries them on by a secant; after one that does not, or that gains little besid
 Why not ``scipy.optimize.least_squares``: this cost is no sum of squares, so that it has to be called in rounds with the
 weight of the data set anew, and it takes no sensitivities from elsewhere, neither borrowed nor carried on. Measured
 while one size of misfit stood for all channels, and this solver ran on its secants for longer: on a session pair with
-an LVDT's scale error four rounds end at the same cost (-540.3) with 650 simulations in 1.6 s, this solver with 86 in
+a sensor's scale error four rounds end at the same cost (-540.3) with 650 simulations in 1.6 s, this solver with 86 in
 0.2 s; on structures that are wrong (cost 2700) rounds with its Huber loss go on to a cost 2 % lower, with 1100 to 1750.
 """
 

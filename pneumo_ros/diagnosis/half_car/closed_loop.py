@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pneumo_ros.diagnosis.signals import Signals
+from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.effects.configured import library_of
 from pneumo_ros.effects.corrected_rig import CorrectedRig
 from pneumo_ros.effects.parameters import Active

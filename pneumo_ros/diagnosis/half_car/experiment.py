@@ -5,20 +5,67 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.experiment import NextExperiment
 from pneumo_ros.diagnosis.experiment import separation as separation_of
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.result import Experiment
 from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.files import new_file
 from pneumo_ros.plant.trim import Trim, trim
 
 DURATION: Final = 12.0  # s, of a proposed experiment [taste]
 PERIOD: Final = 2e-3  # s between rows of a proposed experiment [definition]
+ROAD_FILE: Final = "next_experiment_road.csv"  # name of a file beside the report [definition]
+VALVE_FILE: Final = "next_experiment_valves.csv"  # name of a file beside the report [definition]
+
+
+@dataclass(frozen=True)
+class Experiment(NextExperiment):
+    """What to run to split an ambiguity group: a profile of road and valves, with how far it drives the rivals
+    apart.
+    """
+
+    time: Array  # (N,) s
+    road: Array  # (N, 2) m
+    valves: Array  # (N, 4) m2
+    kind: ClassVar[str] = "road and valve profiles"
+
+    def write(self, folder: Path) -> list[Path]:
+        """The profile as two tables: what ``pneumo run`` plays as ``--road`` and as ``--valves``."""
+        columns_of = "time_s,front_inlet_m2,rear_inlet_m2,front_outlet_m2,rear_outlet_m2"
+        tables = {
+            ROAD_FILE: ("time_s,front_m,rear_m", self.road),
+            VALVE_FILE: (f"# interpolation: held\n{columns_of}", self.valves),
+        }
+        for name, (header, columns) in tables.items():
+            with new_file(folder / name) as part:
+                np.savetxt(part, np.column_stack([self.time, columns]), "%.9g", ",", header=header, comments="")
+        return [folder / name for name in tables]
+
+    def command(self, folder: Path = Path()) -> str:
+        """What plays both tables of a folder."""
+        files = f"--road {folder / ROAD_FILE} --valves {folder / VALVE_FILE}"
+        step = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
+        return f"pneumo run {files} --duration {float(self.time[-1]) + step:g}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Without the profile, which has files of its own."""
+        return {
+            "text": f"{self.aim}; {self.command()} plays it",
+            "command": self.command(),
+            "file": ROAD_FILE,
+            "valve_file": VALVE_FILE,
+            "name": self.name,
+            "description": self.description,
+            "separation": self.separation,
+            "separation_now": self.separation_now,
+        }
 
 
 @dataclass(frozen=True)

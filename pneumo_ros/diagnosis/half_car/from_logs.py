@@ -12,12 +12,12 @@ import numpy as np
 
 from pneumo_ros.diagnosis.diagnose import Fitted, Options, diagnose, split_by_time
 from pneumo_ros.diagnosis.fit.together import each
+from pneumo_ros.diagnosis.half_car.signals import Signals, check_pair, read_signals
+from pneumo_ros.diagnosis.half_car.signals.wiring import check_wiring
+from pneumo_ros.diagnosis.half_car.where import Location, Start, flexible_gain, locate
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
-from pneumo_ros.diagnosis.signals import Signals, check_pair, read_signals
-from pneumo_ros.diagnosis.signals.wiring import check_wiring
-from pneumo_ros.diagnosis.where import Location, Start, flexible_gain, locate
 from pneumo_ros.effects.configured import library_of, with_files
 from pneumo_ros.effects.loading import origins, own_ids
 from pneumo_ros.effects.rig_model import RigModel

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from pneumo_ros.arrays import Array, Mask
+from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.model import EffectLike
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.report.rig_map import draw_map
-from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.diagnosis.signals.types import TopicTiming
 from pneumo_ros.effects.guide import Guide
 

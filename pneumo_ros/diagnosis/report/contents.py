@@ -11,6 +11,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.record_pace import pace_of
+from pneumo_ros.diagnosis.half_car.where import Law
 from pneumo_ros.diagnosis.report.budget import budget_rows, curve_plot, waterfall
 from pneumo_ros.diagnosis.report.card import HALF_CAR, RigCard, ShownLog, ToldEffect
 from pneumo_ros.diagnosis.report.facts import own_parameters
@@ -30,7 +31,6 @@ from pneumo_ros.diagnosis.report.words import (
     winner,
 )
 from pneumo_ros.diagnosis.result import DIFFERS
-from pneumo_ros.diagnosis.where import Law
 
 ZOOM: Final = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off [display]
 SHOWN_CHANNELS: Final = 2  # channels that are shown at once; the others are folded away [display]

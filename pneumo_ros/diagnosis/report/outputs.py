@@ -12,6 +12,17 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.half_car.signals import Signals
+from pneumo_ros.diagnosis.half_car.where import (
+    Location,
+    conditional_gaps,
+    locate,
+    missing_law,
+    occurrence,
+    predict_located,
+)
+from pneumo_ros.diagnosis.half_car.where.design import car_of
+from pneumo_ros.diagnosis.half_car.where.regimes import harmonics
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, total_gap
 from pneumo_ros.diagnosis.report.contents import Findings, told
 from pneumo_ros.diagnosis.report.page import write_report
@@ -19,10 +30,6 @@ from pneumo_ros.diagnosis.report.residual_log import write_residual_log
 from pneumo_ros.diagnosis.report.steps import Asked
 from pneumo_ros.diagnosis.report.story import Story
 from pneumo_ros.diagnosis.result import Diagnosis, write_json
-from pneumo_ros.diagnosis.signals import Signals
-from pneumo_ros.diagnosis.where import Location, conditional_gaps, locate, missing_law, occurrence, predict_located
-from pneumo_ros.diagnosis.where.design import car_of
-from pneumo_ros.diagnosis.where.regimes import harmonics
 from pneumo_ros.effects.loading import laws_of, own_ids
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -87,7 +94,7 @@ def write_outputs(
     ----------
     folder : made if it is not there
     fit, holdout : the logs that were fitted and held out
-    location : from :func:`pneumo_ros.diagnosis.where.locate` on these logs, if it is at hand
+    location : from :func:`pneumo_ros.diagnosis.half_car.where.locate` on these logs, if it is at hand
     asked : what the user typed
     """
     where = location or locate(model, fit, holdout)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_typestore
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.half_car.signals import COMMANDS, MEASURED, ROADS, Signals
 from pneumo_ros.diagnosis.record import Record
-from pneumo_ros.diagnosis.signals import COMMANDS, MEASURED, ROADS, Signals
 from pneumo_ros.log.cdr import JointEncoder, PressureEncoder
 from pneumo_ros.log.topics import (
     COMMAND,

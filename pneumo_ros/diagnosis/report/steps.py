@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pneumo_ros.diagnosis.half_car.experiment import ROAD_FILE, VALVE_FILE
 from pneumo_ros.diagnosis.report.words import LIKELY, first_place, forbidden, place_words
-from pneumo_ros.diagnosis.result import ROAD_FILE, VALVE_FILE
 
 # For a place without a name: (what moves it, the road that does) [display]
 _TELLING: Final = {

@@ -185,6 +185,24 @@ def structure_words(entry: Mapping[str, Any]) -> str:
     return " and ".join([", ".join(named[:-1]), named[-1]]) if len(named) > 1 else "".join(named)
 
 
+def ranking_words(ranking: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Entries of a ranking in words; those of one family and place are told apart by their laws' parameters: "coulomb
+    friction (the slot rail): friction force, turnover rate".
+    """
+    words = [structure_words(entry) for entry in ranking]
+    return [
+        f"{own}: {_law_of(entry)}" if words.count(own) > 1 and entry.get("parameters") else own
+        for own, entry in zip(words, ranking, strict=True)
+    ]
+
+
+def _law_of(entry: Mapping[str, Any]) -> str:
+    """Names of its law's parameters; atoms of a shape are numbered, and called so together."""
+    names = [str(name) for name in entry["parameters"]]
+    law = [name.replace("_", " ") for name in names if " " not in name]
+    return ", ".join([*law, *(["any shape beside it"] if len(law) < len(names) else [])])
+
+
 def closing_words(entry: Mapping[str, Any], verb: str = "") -> str:
     """An entry of the ranking and what it does: "leak (front) closes", "leak (front) and valve lag together close"."""
     was, closes = ("were", "together close") if len(entry["effects"]) > 1 else ("was", "closes")

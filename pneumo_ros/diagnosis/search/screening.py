@@ -172,7 +172,7 @@ def _candidate_scores(
 def compatible(model: Model, one: Part, other: Part) -> bool:
     """Whether two effects may act together: two sites of one family only where they do not overlap, and one sensor's.
 
-    A load that nobody knows of moves body and axle alike, and a resonance all of them: two sensor errors at once are
+    A load that nobody knows of moves several channels alike, and a resonance all of them: two sensor errors at once are
     what almost anything else looks like, so that a second one waits until the first has been mended.
     """
     if all(model.places(Active(*part, ()))[0].startswith(SENSOR) for part in (one, other)):

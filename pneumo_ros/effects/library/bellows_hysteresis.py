@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hysteresis of the bellows' rubber and cord: a Bouc-Wen element in parallel with the spring.
 
-Source: Wen, "Method for random vibration of hysteretic systems", J. Eng. Mech. 102(2), 1976: z' = v/length (1 - |z|^n)
-while loading, v/length (1 + b |z|^n) while unloading; b 0 unloads elastically (equal constants), b 1 steepest. It
-differs from dry friction by its length: millimetres of travel, not a bristle's tenth.
+The law is :mod:`pneumo_ros.laws.hysteresis`, its corner of any sharpness n; unloading 0 lets go elastically, 1
+steepest. It differs from dry friction by its length: millimetres of travel, not a bristle's tenth.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -17,6 +16,7 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.hysteresis import stepped
 
 SUBSTEPS = 4  # a strut moves up to half its yield travel in a step
 
@@ -27,12 +27,7 @@ Values = tuple[float, float, float, float]
 @njit(cache=True, error_model="numpy")
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
     """Force over its limit, one step later, at held speed; never beyond the limit."""
-    value, move = z[0], strut.rate * dt / (SUBSTEPS * p[1])
-    for _ in range(SUBSTEPS):
-        used = abs(value) ** p[2]
-        value += move * (1.0 - used if value * move > 0.0 else 1.0 + p[3] * used)
-        value = min(max(value, -1.0), 1.0)
-    return (value,)
+    return (stepped(z[0], strut.rate * dt / (SUBSTEPS * p[1]), p[2], p[3], SUBSTEPS),)
 
 
 @njit(cache=True, error_model="numpy")

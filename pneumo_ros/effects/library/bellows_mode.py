@@ -18,8 +18,8 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
-from pneumo_ros.effects.oscillator import swung
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.ringing import pulled, swung
 
 State = tuple[float, float]
 Values = tuple[float, float, float, float]
@@ -41,7 +41,7 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 def force(strut: Strut, z: State, p: Values) -> float:
     """Inertia force of the mode on the strut."""
     w = 2.0 * math.pi * p[1]
-    return -p[0] * (w * w * (strut.height - z[0]) + 2.0 * p[2] * w * (1.0 - p[3]) * (strut.rate - z[1]))
+    return -p[0] * pulled(strut.height - z[0], strut.rate - z[1], w, p[2], 1.0 - p[3])
 
 
 EFFECT = Effect(

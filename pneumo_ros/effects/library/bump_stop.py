@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bump stop that meets the strut earlier, or pushes harder, than the nominal one.
 
-k d (1 + a d) (1 - c d(height)/dt) over the depth d: stiffening rubber that loses energy in every contact.
+The law is :func:`pneumo_ros.laws.contact.stop` over the depth below the height of contact; its loss grows with the rate
+of the height.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -15,6 +16,7 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.contact import stop
 from pneumo_ros.plant.half_car import BUMP_STOP_HEIGHT
 
 Values = tuple[float, float, float, float]
@@ -24,7 +26,7 @@ Values = tuple[float, float, float, float]
 def force(strut: Strut, z: tuple[float, ...], p: Values) -> float:
     """N upwards on the body, below the height of contact; never negative."""
     depth = max(0.0, BUMP_STOP_HEIGHT + p[1] - strut.height)
-    return p[0] * depth * (1.0 + p[2] * depth) * max(0.0, 1.0 - p[3] * strut.rate)
+    return stop(depth, p[0], p[2], -p[3] * strut.rate)
 
 
 EFFECT = Effect(

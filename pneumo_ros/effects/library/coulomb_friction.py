@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Dry friction of the strut's bushing: LuGre with the steady curve Fc + (Fs - Fc) exp(-(v/vs)^2).
 
-Source: Canudas de Wit, Olsson, Astrom, Lischinsky, "A new model for control of systems with friction", IEEE TAC 40(3),
-1995. The bristle state is advanced by its exact solution at held speed, so that the stiffest bristle needs no shorter
-step.
+The law is :mod:`pneumo_ros.laws.friction`: its bristle is advanced by its exact solution at held speed, so that the
+stiffest one needs no shorter step.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
 
 from __future__ import annotations
-
-import math
 
 from numba import njit
 
@@ -19,6 +16,7 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.friction import bristle, bristle_force, stribeck
 
 STRIBECK_SPEED = 0.012  # m/s; moves the output far less than force and bristle length do
 BRISTLE_DAMPING = 15.0  # N s/m, fades with speed; keeps the stuck strut from ringing
@@ -32,12 +30,7 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     """Bristle force over Fc, one step later: dz/dt = v/s - |v| z/(s g) with s the bristle length."""
     if p[0] <= 0.0:
         return (0.0,)
-    speed = abs(strut.rate)
-    ratio = speed / STRIBECK_SPEED
-    steady = 1.0 + p[2] * math.exp(-ratio * ratio)
-    fade = math.exp(-speed / (p[1] * steady) * dt)
-    target = steady if strut.rate > 0.0 else -steady
-    return (target + (z[0] - target) * fade,)
+    return (bristle(z[0], strut.rate, p[1], stribeck(strut.rate, STRIBECK_SPEED, p[2]), dt),)
 
 
 @njit(cache=True, error_model="numpy")
@@ -45,8 +38,7 @@ def force(strut: Strut, z: State, p: Values) -> float:
     """Opposes the strut's motion; the bristle's damping only while it still bends."""
     if p[0] <= 0.0:
         return 0.0
-    left = max(0.0, 1.0 - abs(z[0]))
-    return -p[0] * z[0] - min(BRISTLE_DAMPING, 4.0 * p[0]) * left * strut.rate
+    return -bristle_force(z[0], strut.rate, p[0], BRISTLE_DAMPING)
 
 
 EFFECT = Effect(

@@ -19,10 +19,11 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.flow import alike_at, gap_over_hole
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT
 
 REFERENCE = 3e5  # Pa absolute
-LAMINAR = REFERENCE / (REFERENCE**2 - ATMOSPHERE**2)  # makes both laws agree there, the hole being sonic
+LAMINAR = alike_at(REFERENCE, ATMOSPHERE)
 
 Values = tuple[float, float]
 
@@ -32,7 +33,7 @@ def air(air: Air, z: tuple[float, ...], p: Values) -> float:
     """Pressure rate of the air lost."""
     # The hole's flow holds P and 1/sqrt(T).
     cold = math.sqrt(air.supply_temperature / air.temperature)
-    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure) * cold
+    gap = gap_over_hole(air.pressure, ATMOSPHERE, LAMINAR) * cold
     flow = p[0] * air.escape * (1.0 + p[1] * (gap - 1.0))
     return -air.exponent * GAS_CONSTANT * air.temperature * flow / air.volume
 

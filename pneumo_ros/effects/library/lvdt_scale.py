@@ -7,6 +7,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import Effect, Memory, Values
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import STILL_FOLLOWS, EffectParameter
+from pneumo_ros.laws.signal import scaled, unscaled
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
 
@@ -14,13 +15,13 @@ def outputs(
     outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
 ) -> tuple[Array, Memory]:
     """What the sensor reports."""
-    outputs[:, channels] *= 1.0 + values[0]
+    outputs[:, channels] = scaled(outputs[:, channels], values[0])
     return outputs, None
 
 
 def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
     """What was really there."""
-    measured[:, channels] /= 1.0 + values[0]
+    measured[:, channels] = unscaled(measured[:, channels], values[0])
     return measured
 
 

@@ -17,6 +17,7 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.flow import in_excess
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT
 
 MIDDLE = 0.5  # ratio of downstream to upstream pressure at which the error is stated
@@ -27,9 +28,8 @@ Values = tuple[float, float, float]
 @njit(cache=True, error_model="numpy")
 def air(air: Air, z: tuple[float, ...], p: Values) -> float:
     """Pressure rate of the flow in excess."""
-    inlet = p[0] * (1.0 + p[1] * (air.pressure / air.supply - MIDDLE))
-    outlet = p[0] * p[2] * (1.0 + p[1] * (ATMOSPHERE / air.pressure - MIDDLE))
-    flow = inlet * air.inflow - outlet * air.outflow
+    inlet = in_excess(air.inflow, p[0], p[1], air.pressure / air.supply - MIDDLE)
+    flow = inlet - in_excess(air.outflow, p[0] * p[2], p[1], ATMOSPHERE / air.pressure - MIDDLE)
     return air.exponent * GAS_CONSTANT * air.temperature * flow / air.volume
 
 

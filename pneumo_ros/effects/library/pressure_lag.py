@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values, by_column
-from pneumo_ros.effects.filters import lagged_line
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import Derived, EffectParameter
+from pneumo_ros.laws.filters import lagged_line
 
 
 def outputs(

@@ -9,6 +9,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import PRESSURES_OR_BOTH, Effect, Memory, Values
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import STILL_FOLLOWS, EffectParameter
+from pneumo_ros.laws.signal import scaled_about, unscaled_about
 from pneumo_ros.units import ATMOSPHERE
 
 
@@ -16,13 +17,13 @@ def outputs(
     outputs: Array, period: float, channels: tuple[int, ...], values: Values, memory: Memory
 ) -> tuple[Array, Memory]:
     """What the sensor reports."""
-    outputs[:, channels] += values[0] * (outputs[:, channels] - values[1])
+    outputs[:, channels] = scaled_about(outputs[:, channels], values[0], values[1])
     return outputs, None
 
 
 def undo(measured: Array, channels: tuple[int, ...], values: Values) -> Array:
     """What was really there."""
-    measured[:, channels] = (measured[:, channels] + values[0] * values[1]) / (1.0 + values[0])
+    measured[:, channels] = unscaled_about(measured[:, channels], values[0], values[1])
     return measured
 
 

@@ -8,8 +8,6 @@ Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
@@ -17,6 +15,7 @@ from pneumo_ros.effects.contract import RIG, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.memory import relaxed
 
 State = tuple[float]
 Values = tuple[float, float]
@@ -32,9 +31,7 @@ def start(front: Air, rear: Air, p: Values) -> State:
 @njit(cache=True, error_model="numpy")
 def advance(z: State, front: Air, rear: Air, dt: float, p: Values) -> State:
     """Exact first order at held flow."""
-    target = p[0] * (front.inflow + rear.inflow)
-    fade = math.exp(-dt / max(p[1], 1e-4))
-    return (min(target + (z[0] - target) * fade, DEEPEST),)
+    return (min(relaxed(z[0], p[0] * (front.inflow + rear.inflow), dt, max(p[1], 1e-4)), DEEPEST),)
 
 
 @njit(cache=True, error_model="numpy")

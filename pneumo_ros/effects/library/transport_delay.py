@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
-from pneumo_ros.effects.filters import delayed_hold
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.filters import delayed_hold
 
 
 def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:

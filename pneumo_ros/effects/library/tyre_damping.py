@@ -13,12 +13,13 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Tyre
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.damping import linear
 
 
 @njit(cache=True, error_model="numpy")
 def tyre(tyre: Tyre, z: tuple[float, ...], p: tuple[float]) -> float:
     """Damping of the compression's rate."""
-    return p[0] * tyre.rate
+    return linear(tyre.rate, p[0])
 
 
 EFFECT = Effect(

@@ -13,12 +13,13 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Tyre
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.contact import missing_pull
 
 
 @njit(cache=True, error_model="numpy")
 def tyre(tyre: Tyre, z: tuple[float, ...], p: tuple[float]) -> float:
     """Takes the lost share of the pull away."""
-    return -p[0] * tyre.force if tyre.compression < 0.0 else 0.0
+    return missing_pull(tyre.force, p[0])
 
 
 EFFECT = Effect(

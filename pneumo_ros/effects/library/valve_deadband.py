@@ -4,20 +4,21 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import ENDS, Effect, Ends, Inputs, Memory, Values, by_column
-from pneumo_ros.effects.filters import played
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.filters import play
+from pneumo_ros.laws.signal import dead
 
 
 def inputs(inputs: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
     """Inlets of the given ends: sticking, then overlap."""
 
-    def opened(u: NDArray[np.float64], held: Memory) -> tuple[NDArray[np.float64], Memory]:
-        moved = played(np.ascontiguousarray(u), values[1], u[0] if held is None else held)
-        return np.maximum(moved - values[0], 0.0), float(moved[-1])
+    def opened(u: Array, held: Memory) -> tuple[Array, Memory]:
+        moved, held = play(u, values[1], held)
+        return np.maximum(moved - dead(moved, values[0]), 0.0), held
 
     commands, memory = by_column(opened, inputs.commands, ends.columns, memory)
     return inputs._replace(commands=commands), memory

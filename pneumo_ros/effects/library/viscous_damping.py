@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bushing damps more (or less) than the nominal constant and its tolerance allow (Eq. 5.8).
 
--c (1 + b |v|) v: b is how much the constant grows, or falls, with speed.
+The law is :func:`pneumo_ros.laws.damping.growing`.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -15,12 +15,13 @@ from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.laws.damping import growing
 
 
 @njit(cache=True, error_model="numpy")
 def force(strut: Strut, z: tuple[float, ...], p: tuple[float, float]) -> float:
     """Against the strut's rate."""
-    return -p[0] * (1.0 + p[1] * abs(strut.rate)) * strut.rate
+    return -growing(strut.rate, p[0], p[1])
 
 
 EFFECT = Effect(

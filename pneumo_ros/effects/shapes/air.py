@@ -17,12 +17,13 @@ from numba import njit
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.library.leak import LAMINAR, REFERENCE
 from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.laws.flow import gap_over_hole, relieved
+from pneumo_ros.laws.memory import relaxed
 from pneumo_ros.plant.air_spring import MEAN_AREA
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, INCH
 
-REFERENCE = 3e5  # Pa absolute
-LAMINAR = REFERENCE / (REFERENCE**2 - ATMOSPHERE**2)  # a long gap with the flow of a hole at the reference
 OPENS = (2.5e5, 3.5e5)  # Pa above which a leak begins
 USUAL = 1e-3  # kg/s, a valve's usual flow
 MIDDLE = 1.8 * INCH  # m
@@ -70,9 +71,9 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     """The air's mass by its flows, the walls that follow its temperature, and orifices that change with time."""
     t = air.temperature
     return (
-        max(z[0] + dt * (air.inflow - air.outflow), 1e-7), t + (z[1] - t) * math.exp(-dt / MEMORIES[0]),
-        t + (z[2] - t) * math.exp(-dt / MEMORIES[1]), t + (z[3] - t) * math.exp(-dt / MEMORIES[2]),
-        1.0 + (z[4] - 1.0) * math.exp(-dt / SETTLES[0]), 1.0 + (z[5] - 1.0) * math.exp(-dt / SETTLES[1]),
+        max(z[0] + dt * (air.inflow - air.outflow), 1e-7), relaxed(z[1], t, dt, MEMORIES[0]),
+        relaxed(z[2], t, dt, MEMORIES[1]), relaxed(z[3], t, dt, MEMORIES[2]),
+        relaxed(z[4], 1.0, dt, SETTLES[0]), relaxed(z[5], 1.0, dt, SETTLES[1]),
     )  # fmt: skip
 
 
@@ -81,9 +82,9 @@ def air(air: Air, z: State, p: Values) -> float:
     """Pressure rate of all atoms together, Pa/s."""
     ratio, pressure, t = air.pressure / air.supply, air.pressure / REFERENCE, air.temperature
     cold = math.sqrt(air.supply_temperature / t)
-    gap = LAMINAR * (air.pressure - ATMOSPHERE * ATMOSPHERE / air.pressure) * cold
+    gap = gap_over_hole(air.pressure, ATMOSPHERE, LAMINAR) * cold
     leak = p[0] + p[1] * gap
-    leak += p[2] * max(0.0, air.pressure - 2.5e5) / 1e5 + p[3] * max(0.0, air.pressure - 3.5e5) / 1e5
+    leak += p[2] * relieved(air.pressure, 2.5e5) / 1e5 + p[3] * relieved(air.pressure, 3.5e5) / 1e5
     flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
     flow -= air.outflow * (p[7] + p[8] * (ATMOSPHERE / air.pressure - 0.5)) + leak * air.escape
     flow += p[18] + air.inflow * (p[23] * z[4] + p[24] * z[5]) - air.outflow * (p[21] * z[4] + p[22] * z[5])

@@ -11,14 +11,14 @@ Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.laws.friction import clipped, slid
+from pneumo_ros.laws.memory import relaxed
 from pneumo_ros.units import INCH
 
 RATES = (0.012, 0.022, 0.04, 0.13, 0.4)  # m/s at which a ramp saturates; shorter ones stick, which sliders do
@@ -66,12 +66,6 @@ Values = tuple[float, ...]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _slid(z: float, move: float) -> float:
-    """A slider's stretch ``z`` over its slack, -1..1, after a ``move`` in the same unit."""
-    return min(max(z + move, -1.0), 1.0)
-
-
-@njit(cache=True, error_model="numpy", inline="always")
 def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
     """Sliders free of force, memories at the strut's height."""
     return (0.0, 0.0, 0.0, 0.0, 0.0, strut.height, strut.height, strut.height)
@@ -82,10 +76,9 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
     """Sliders and memories one step later, at held rate and height."""
     move, h = strut.rate * dt, strut.height
     return (
-        _slid(z[0], move * PER_SLACK[0]), _slid(z[1], move * PER_SLACK[1]), _slid(z[2], move * PER_SLACK[2]),
-        _slid(z[3], move * PER_SLACK[3]), _slid(z[4], move * PER_SLACK[4]),
-        h + (z[5] - h) * math.exp(-dt / LAGS[0]), h + (z[6] - h) * math.exp(-dt / LAGS[1]),
-        h + (z[7] - h) * math.exp(-dt / LAGS[2]),
+        slid(z[0], move * PER_SLACK[0]), slid(z[1], move * PER_SLACK[1]), slid(z[2], move * PER_SLACK[2]),
+        slid(z[3], move * PER_SLACK[3]), slid(z[4], move * PER_SLACK[4]),
+        relaxed(z[5], h, dt, LAGS[0]), relaxed(z[6], h, dt, LAGS[1]), relaxed(z[7], h, dt, LAGS[2]),
     )  # fmt: skip
 
 
@@ -101,7 +94,7 @@ def force(strut: Strut, z: State, p: Values) -> float:
         w = -v
         out += p[7] * min(w * r[0], 1.0) + p[8] * min(w * r[1], 1.0) + p[9] * min(w * r[2], 1.0)
         out += p[10] * min(w * r[3], 1.0) + p[11] * min(w * r[4], 1.0) + p[12] * w + p[13] * w * w
-    out -= p[14] * load * min(max(v * r[0], -1.0), 1.0)
+    out -= p[14] * load * clipped(v * r[0], 1.0)
     out -= p[15] * z[0] + p[16] * z[1] + p[17] * z[2] + p[18] * z[3] + p[19] * z[4]
     if h < STOPS[4]:
         out += p[20] * max(0.0, STOPS[0] - h) + p[21] * max(0.0, STOPS[1] - h) + p[22] * max(0.0, STOPS[2] - h)

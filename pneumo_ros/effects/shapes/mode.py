@@ -19,9 +19,9 @@ from numba import njit
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
-from pneumo_ros.effects.oscillator import swung
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
+from pneumo_ros.laws.ringing import pulled, swung
 
 State = tuple[float, float]
 Values = tuple[float, float, float, float, float]
@@ -43,7 +43,7 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 def _on_each(middle: float, rate: float, z: State, p: Values) -> float:
     """N upwards on each plate; ``middle`` between the plates, m, and its ``rate``, m/s."""
     w = 2.0 * math.pi * p[1]
-    return 0.5 * (p[0] * (w * w * (z[0] - middle) + 2.0 * p[2] * w * (1.0 - p[4]) * (z[1] - rate)) - p[3])
+    return 0.5 * (p[0] * pulled(z[0] - middle, z[1] - rate, w, p[2], 1.0 - p[4]) - p[3])
 
 
 @njit(cache=True, error_model="numpy")

@@ -26,9 +26,9 @@ from numba import njit
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
 from pneumo_ros.effects.hooks import Strut, Tyre
-from pneumo_ros.effects.oscillator import swung
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
+from pneumo_ros.laws.ringing import pulled, swung
 
 Swing = tuple[float, float]
 Shaken = tuple[float, float, float, float]
@@ -61,8 +61,7 @@ def swing(z: Swing, front: Strut, rear: Strut, dt: float, p: Values) -> Swing:
 def on_body(front: Strut, rear: Strut, z: Swing, p: Values) -> tuple[float, float]:
     """Spring, damper and weight, shared by the lever."""
     to, rate = _hung(front, rear, p[3])
-    w = 2.0 * math.pi * p[1]
-    up = -p[0] * (w * w * (to - z[0]) + 2.0 * p[2] * w * (rate - z[1])) - p[4]
+    up = -p[0] * pulled(to - z[0], rate - z[1], 2.0 * math.pi * p[1], p[2], 1.0) - p[4]
     return p[3] * up, (1.0 - p[3]) * up
 
 

@@ -5,11 +5,6 @@ A slow part is a mixture of lags and delays with nonnegative shares, and one fol
 fitted (mixtures of limits are not like a limit between them); a dead zone takes away ramps that end at a corner, and
 what a play of some width does not pass; a sensor's error is a polynomial of its own reading; its
 zero creeps from where it stood when the log began, by exponentials of every length.
-
-Kernel arguments
-----------------
-u, held : (N,) signal, and where the follower stood before, in one unit
-up, down, most : share of the way that a follower goes in one sample, and how far it goes at most
 """
 
 from __future__ import annotations
@@ -18,7 +13,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numba import njit
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.effects.contract import (
@@ -31,9 +25,10 @@ from pneumo_ros.effects.contract import (
     Values,
     by_column,
 )
-from pneumo_ros.effects.filters import delayed_hold, first_order_line, lagged_hold, played
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
+from pneumo_ros.laws.filters import delayed_hold, first_order_line, followed, lagged_hold, play
+from pneumo_ros.laws.signal import bent, crept, dead
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
 Filter = Callable[[Array, float, Memory], tuple[Array, Memory]]
@@ -70,22 +65,7 @@ def _line(tau: float) -> Filter:
 
 
 def _play(half: float) -> Filter:
-    def passed(u: Array, period: float, memory: Memory) -> tuple[Array, Memory]:
-        y = played(np.ascontiguousarray(u), half, float(u[0]) if memory is None else memory)
-        return y, float(y[-1])
-
-    return passed
-
-
-@njit(cache=True, nogil=True)
-def _followed(u: Array, up: float, down: float, most: float, held: float) -> Array:
-    y = np.empty_like(u)
-    for i in range(u.shape[0]):
-        step = u[i] - held
-        step *= up if step > 0.0 else down
-        held += min(max(step, -most), most)
-        y[i] = held
-    return y
+    return lambda u, period, memory: play(u, half, memory)
 
 
 def _follow(slew: float, rising: float, falling: float) -> Filter:
@@ -94,14 +74,14 @@ def _follow(slew: float, rising: float, falling: float) -> Filter:
     def passed(u: Array, period: float, memory: Memory) -> tuple[Array, Memory]:
         up, down = (1.0 - math.exp(-period / tau) for tau in (rising, falling))
         held = float(u[0]) if memory is None else memory
-        y = _followed(np.ascontiguousarray(u), up, down, slew * period, held)
+        y = followed(np.ascontiguousarray(u), up, down, slew * period, held)
         return y, float(y[-1])
 
     return passed
 
 
 def _corner(end: float) -> Filter:
-    return lambda u, period, memory: (u - np.minimum(u, end), None)
+    return lambda u, period, memory: (u - dead(u, end), None)
 
 
 def mixed(filters: Sequence[Filter], u: Array, period: float, shares: Values, memory: Memory) -> tuple[Array, Memory]:
@@ -151,10 +131,7 @@ def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: M
 def _static_error(x: Array, rest: float, swing: float, powers: Sequence[int], values: Values) -> Array:
     """A sensor's error over its own reading, in the reading's unit: a polynomial about the rest, with kinks."""
     z = (x - rest) / swing
-    out = np.zeros_like(z)
-    for value, power in zip(values, powers, strict=False):
-        if value != 0.0:
-            out += value * z**power
+    out = bent(z, powers, values)
     for k, kink in enumerate(KINKS):
         above, below = values[len(powers) + 2 * k : len(powers) + 2 * k + 2]
         if above != 0.0 or below != 0.0:
@@ -208,7 +185,7 @@ def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> E
     ) -> tuple[Array, Memory]:
         begun = memory or 0  # rows: a time would add up otherwise in other blocks
         time = period * np.arange(begun, begun + len(given))
-        moved = sum(v * (1.0 - np.exp(-time / tau)) for v, tau in zip(values, CREEPS, strict=True))
+        moved = sum(v * crept(time, tau) for v, tau in zip(values, CREEPS, strict=True))
         given[:, channels] += np.reshape(moved, (-1, 1))
         return given, begun + len(given)
 

@@ -6,14 +6,13 @@ Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import RIG
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.laws.memory import relaxed
 
 TIMES = (0.01, 0.05, 0.25, 1.2, 6.0)  # s
 SQUARE_TIMES = (0.02, 0.5, 4.0)  # s
@@ -42,10 +41,10 @@ def advance(z: State, front: Air, rear: Air, dt: float, p: Values) -> State:
     w = front.inflow + rear.inflow
     s = w * w
     return (
-        w + (z[0] - w) * math.exp(-dt / 0.01), w + (z[1] - w) * math.exp(-dt / 0.05),
-        w + (z[2] - w) * math.exp(-dt / 0.25), w + (z[3] - w) * math.exp(-dt / 1.2),
-        w + (z[4] - w) * math.exp(-dt / 6.0), s + (z[5] - s) * math.exp(-dt / 0.02),
-        s + (z[6] - s) * math.exp(-dt / 0.5), s + (z[7] - s) * math.exp(-dt / 4.0),
+        relaxed(z[0], w, dt, 0.01), relaxed(z[1], w, dt, 0.05),
+        relaxed(z[2], w, dt, 0.25), relaxed(z[3], w, dt, 1.2),
+        relaxed(z[4], w, dt, 6.0), relaxed(z[5], s, dt, 0.02),
+        relaxed(z[6], s, dt, 0.5), relaxed(z[7], s, dt, 4.0),
     )  # fmt: skip
 
 

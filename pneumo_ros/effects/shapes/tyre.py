@@ -17,6 +17,8 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.shapes.atoms import Atom, Term
+from pneumo_ros.laws.damping import linear
+from pneumo_ros.laws.friction import clipped, slid
 
 RATES = (0.03, 0.15)  # m/s
 SLACKS = (3e-4, 1.5e-3)  # m
@@ -42,14 +44,14 @@ Values = tuple[float, ...]
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
     """Sliders one step later."""
     move = tyre.rate * dt
-    return (min(max(z[0] + move * PER_SLACK[0], -1.0), 1.0), min(max(z[1] + move * PER_SLACK[1], -1.0), 1.0))
+    return (slid(z[0], move * PER_SLACK[0]), slid(z[1], move * PER_SLACK[1]))
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def tyre(tyre: Tyre, z: State, p: Values) -> float:
     """Sum of the atoms."""
     v, c, rest, r = tyre.rate, tyre.compression, tyre.rest, PER_RATE
-    out = p[0] * v + p[1] * min(max(v * r[0], -1.0), 1.0) + p[2] * min(max(v * r[1], -1.0), 1.0)
+    out = linear(v, p[0]) + p[1] * clipped(v * r[0], 1.0) + p[2] * clipped(v * r[1], 1.0)
     out += p[3] * v * max(0.0, c) * PER_LOADED + p[4] * z[0] + p[5] * z[1]
     out += p[6] * max(0.0, -c) + p[7] * max(0.0, 0.05 * rest - c) + p[8] * max(0.0, 0.15 * rest - c)
     out += p[9] * max(0.0, 0.35 * rest - c) + p[10] * max(0.0, 0.7 * rest - c)

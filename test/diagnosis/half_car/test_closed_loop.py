@@ -12,7 +12,7 @@ import pytest
 
 from pneumo_ros.control.loop import measure
 from pneumo_ros.diagnosis.half_car.closed_loop import rerun_diagnosed
-from pneumo_ros.diagnosis.signals import Signals, read_signals
+from pneumo_ros.diagnosis.half_car.signals import Signals, read_signals
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.half_car import HalfCar

@@ -13,12 +13,11 @@ from pneumo_ros.diagnosis.diagnose import Options, diagnose
 from pneumo_ros.diagnosis.experiment import SEPARATES
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
-from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, design_experiment
-from pneumo_ros.diagnosis.result import Experiment
+from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, Experiment, design_experiment
+from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.state import Search
-from pneumo_ros.diagnosis.signals import Signals
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.rig import load_rig

@@ -15,6 +15,7 @@ import pytest
 from helpers.findings import PLACES, findings
 from helpers.rig_logs import signals_of, simulated
 
+from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.report import render, write_outputs, write_report, write_residual_log
 from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.quantities import readable, rounded
@@ -24,9 +25,9 @@ from pneumo_ros.diagnosis.report.words import (
     confidence,
     headline,
     place_words,
+    ranking_words,
 )
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
-from pneumo_ros.diagnosis.signals import MEASURED
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -247,3 +248,17 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     assert dict(first.facts)["how big"] == "leak area 0.4000 ± 0.0010 mm²"
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"
+
+
+def test_laws_of_one_family_are_told_apart_in_the_ranking() -> None:
+    def entry(*parameters: str) -> dict[str, object]:
+        return {"effects": ["coulomb_friction"], "sites": ["rail"], "parameters": dict.fromkeys(parameters)}
+
+    alone = {"effects": ["lag"], "sites": ["input:force"], "parameters": {"lag": None}}
+    none = {"effects": ["none"], "sites": [], "parameters": {}}
+    assert ranking_words([entry("friction_force"), entry("friction_force", "friction_out 1"), alone, none]) == [
+        "coulomb friction (the slot rail): friction force",
+        "coulomb friction (the slot rail): friction force, any shape beside it",
+        "lag (the input force)",
+        "none",
+    ]

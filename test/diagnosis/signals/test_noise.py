@@ -11,8 +11,8 @@ from helpers.rig_logs import DISPLACEMENT_NOISE, PRESSURE_NOISE, topics_of_chann
 
 from pneumo_ros.control.half_car import build_controller
 from pneumo_ros.control.loop import Run, close_loop
+from pneumo_ros.diagnosis.half_car.signals import Signals, prepare
 from pneumo_ros.diagnosis.judge.held_out import channel_gaps, noise_floor, total_gap
-from pneumo_ros.diagnosis.signals import Signals, prepare
 from pneumo_ros.diagnosis.signals.noise import white_noise
 from pneumo_ros.estimation.half_car import build_estimator
 from pneumo_ros.plant.trim import nominal_half_car
