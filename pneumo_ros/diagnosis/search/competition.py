@@ -180,7 +180,8 @@ def _run_singles(search: Search) -> None:
 def _near_the_log(search: Search) -> list[CandidateScore]:
     """Singles ranked by fits to short windows of the log, the best first; none where these cannot be fitted.
 
-    Used where the free run of the nominal structure has left the log altogether: from there all candidates score alike."""
+    Used where the nominal structure's free run has left the log altogether: from there all candidates score alike.
+    """
     problem, short = search.problem, windowed(search.problem)
     if short is None:
         return []
