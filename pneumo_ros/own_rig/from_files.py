@@ -134,9 +134,10 @@ def _of_another_order(model: OwnRig, records: Sequence[OwnRecord]) -> list[str]:
 
 
 def _shown_form(found: Diagnosis) -> float | None:
-    """Twice what the best structure leaves of the held-out gap above the sensors' noise, where that is next to nothing
-    of a gap that was not worth a name.
-    """
+    """Model form that the data themselves show, as a share of a channel's standard deviation; None where they do not.
+
+    They show one where the verdict is "none", the refit leaves more than noise, and the best named structure closes
+    nearly all of that (:data:`NEXT_TO_NOTHING`): then it is twice what that structure leaves above the noise."""
     if found.verdict != "none":
         return None
     left = min((entry.gap_after for entry in found.ranking if entry.parameters), default=np.inf)

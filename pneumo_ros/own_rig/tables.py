@@ -76,7 +76,7 @@ def _of_table(path: Path, spec: SignalSpec, rig: Description) -> Sampled:
 
 
 class Columns(dict[str, Array]):
-    """Columns by name; :attr:`others` are there as well and cannot be taken, by what they are."""
+    """Columns by name; those that are there as well and cannot be taken stand in ``others``, by what they are."""
 
     def __init__(self, *columns: Any) -> None:
         super().__init__(*columns)

@@ -126,14 +126,18 @@ def nuisance_estimates(problem: Problem, fit: Fit, cov: Array) -> dict[str, Esti
 
 
 def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -> tuple[float, float]:
-    """How many parameters of its effects, or of some parts, ended at an end of their allowed range: of laws and of
-    sizes, and of those that only bend a shape.
+    """Number of effect parameters that ended at a bound of their range, in two sums, each with the weights below.
 
-    A size counts whole: nothing of the kind is so large; and so does what shapes a law where another family begins.
-    What else shapes a law counts half, however much of it, because another law may bend it; and so does a law's size
-    beside its family's shape, which can do the same and may push it anywhere. What shapes a law beside that does not
-    count: nothing is asked of it that the shape cannot do.
-    """
+    The first sum is of sizes and of shape parameters of laws. A size at its bound counts 1 (nothing real is so large),
+    and so does a shape parameter at a bound where another family begins; all other shape parameters of a law count
+    0.5 together, because another law of the family may need them there. Where the family's flexible shape stands
+    beside the law, a size counts 0.5 and the law's shape parameters nothing: the flexible shape can do the same. The
+    second sum is of the parameters of flexible shapes that are no sizes, 0.5 each.
+
+    Parameters
+    ----------
+    problem, fit : the fitted structure
+    parts : count these parts only; all by default"""
     free, values = _free(problem, fit)[problem.fixed :], problem.values(fit.candidate, fit.x)
     first, firm, bent = 0, 0.0, 0.0
     for part in fit.candidate.parts:

@@ -172,9 +172,11 @@ def judge(
 
 
 def _beside_unnamed(trust: Mapping[Part, float], evidence: Sequence[EffectEvidence]) -> dict[Part, float]:
-    """No name stands where something larger acts at the same place that is not what it was called: the smaller one may
-    be the rest of it. A sensor's error stands beside no such thing anywhere: what moves the rig looks like one. What
-    nobody misses on the held-out log, above noise and form, acts nowhere."""
+    """Probability of each effect, at most that of every larger effect that is blamed on the same place.
+
+    Where the larger one at a place is probably misnamed, the smaller one may be a remainder of it. A sensor's error is
+    bounded by larger effects at any place, because what moves the rig can look like one. Effects that the held-out log
+    does not miss, above noise and model form, bound nothing."""
     out = dict(trust)
     for one in evidence:
         sensor = one.places[0].startswith(SENSOR)
@@ -277,12 +279,11 @@ def _of_one_size(refit: Scored, some: Sequence[Scored], calibration: Calibration
 
 
 def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration) -> float:
-    """Probability that what the refit leaves is the work of something without a name, where no effect was chosen.
+    """Probability, 0..1, that something without a name makes what the refit leaves, where no effect was chosen.
 
-    What stays within a model form that is stated or assumed, on the held-out log, is nothing's.
+    Zero where the refit leaves no more on the held-out log than the model form that is stated or assumed.
 
-    ``level_refit`` : mean square on the selection blocks, sigmas
-    """
+    ``level_refit`` : mean square on the selection blocks, sigma squared"""
     if held.within_form:
         return 0.0
     c = calibration
@@ -292,5 +293,5 @@ def unexplained(level_refit: float, held: HeldOutGaps, calibration: Calibration)
 
 
 def beyond(gap: float, floor: float) -> float:
-    """What a gap holds beside a floor, both in noise floors."""
+    """Root of the difference of the squares of a gap and a floor, both in noise floors; 0 below the floor."""
     return float(np.sqrt(max(0.0, gap**2 - floor**2)))

@@ -103,18 +103,19 @@ def _choose_fold(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:
 
 
 def room_for_more(search: Search) -> bool:
-    """Whether a second effect could still be evident: not when what the best structure so far leaves on the selection
-    blocks is so near the sensors' noise that even all of the rest would not be enough.
-    """
+    """Whether a second effect could still be shown to act.
+
+    It could not where the best structure so far leaves so little on the selection blocks above the sensors' noise that
+    a second effect which took all of it would still stay below its threshold (:class:`Thresholds`)."""
     problem = search.problem
     least = min(score(problem, one).level for one in (search.refit, *search.finalists))
     return float(np.log((FORM + least) / (FORM + noise_level(problem)))) > NOT_EVIDENT * Thresholds().second
 
 
 def _one_suffices(search: Search) -> bool:
-    """Whether a single with its family's shape leaves little enough: what a second effect may add to it is found beside
-    it, and no pairs are looked for.
-    """
+    """Whether the best single, with its family's shape beside it, leaves so little that no pairs are searched.
+
+    A second effect is then looked for beside that single only."""
     problem = search.problem
     enough = SUFFICES + SUFFICES_OF_REFIT**2 * score(problem, search.refit).level
     return min((score(problem, one).level for one in search.finalists), default=np.inf) < enough
@@ -177,8 +178,9 @@ def _run_singles(search: Search) -> None:
 
 
 def _near_the_log(search: Search) -> list[CandidateScore]:
-    """The singles as short windows see them, the most promising first: next to a free run that is lost, no candidate is
-    better than another.
+    """Singles ranked by fits to short windows of the log, the best first; none where these cannot be fitted.
+
+    Used where the nominal structure's free run has left the log altogether: from there all candidates score alike.
     """
     problem, short = search.problem, windowed(search.problem)
     if short is None:

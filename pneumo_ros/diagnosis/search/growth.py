@@ -105,7 +105,9 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
 
 
 def _one_less(problem: Problem, found: Fit) -> Fit | None:
-    """The structure without the effect that it misses least, of those it had before the latest."""
+    """The structure without one of its effects, the one that costs least to remove; the latest effect always stays.
+
+    None where every smaller structure diverges."""
     without = problem.each(
         lambda law: reduced(problem, found, of_law(found.candidate, law), 2), found.candidate.laws[:-1]
     )
@@ -160,7 +162,7 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
 
 
 def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
-    """What may act beside all of them."""
+    """Parts of the library that may act beside all of ``laws``, see :func:`compatible`."""
     return [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
 
 
@@ -186,7 +188,9 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
 
 
 def _end(search: Search, best: Scored) -> None:
-    """Fit the likeliest structures of as many effects to the end: what short fits leave is no difference of laws."""
+    """Fit to convergence the likeliest structures with as many effects as ``best``, where their weights are close.
+
+    Short fits end at different depths, and that difference must not decide between families."""
     problem = search.problem
     scored = [score(problem, one) for one in search.finalists]
     groups = by_families([one for one in scored if one.size == best.size]).values()
@@ -227,6 +231,6 @@ def _without_idle_shapes(search: Search, found: Fit) -> Fit:
 
 
 def _does(problem: Problem, less: Fit, more: Fit) -> bool:
-    """Whether a smaller structure predicts the kept blocks as well and costs no more."""
+    """Whether the smaller structure ``less`` predicts the kept blocks as well as ``more`` and has no higher price."""
     one, other = score(problem, less), score(problem, more)
     return one.level <= other.level * (1.0 + SAME) + IDLE and one.price < other.price + 1.0

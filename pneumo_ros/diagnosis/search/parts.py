@@ -52,7 +52,7 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
 
 
 def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:
-    """Start of a part whose law is not linear in all its parameters, by screening; nothing for others."""
+    """Start values of a part that is not linear in all its parameters, the best of the screening; empty for others."""
     if all(p.size or not p.starts for p in problem.parameters_of[part]):
         return []
     found = candidate_scores(problem, one, trials(problem, one, [part]))
@@ -60,7 +60,10 @@ def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:
 
 
 def _beginnings(problem: Problem, one: Fit, part: Part) -> list[float]:
-    """Values of a part that does nothing yet: sizes zero, and whatever a law of its family has found by that name."""
+    """Start values, SI, of a part that has no effect yet.
+
+    Sizes are zero; a shape parameter starts where a law of the same family at the same site has found it, else at its
+    typical value."""
     own = iter(problem.values(one.candidate, one.x).tolist())
     found = {
         (family_of(other[0]), other[1], p.name): next(own)

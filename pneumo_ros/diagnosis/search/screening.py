@@ -170,25 +170,24 @@ def _candidate_scores(
 
 
 def compatible(model: Model, one: Part, other: Part) -> bool:
-    """Whether two effects may act together: two sites of one family only where they do not overlap, and one sensor's.
+    """Whether two effects may act together: not two sensors' errors, and not one family at overlapping sites.
 
-    A load that nobody knows of moves several channels alike, and a resonance all of them: two sensor errors at once are
-    what almost anything else looks like, so that a second one waits until the first has been mended.
-    """
+    Two sensor errors at once imitate almost anything (an unknown load moves body and axle alike, a resonance moves
+    everything), so a second one is only looked for after the first is part of the structure."""
     if all(model.places(Active(*part, ()))[0].startswith(SENSOR) for part in (one, other)):
         return False
     return family_of(one[0]) != family_of(other[0]) or (one[1] != other[1] and "both" not in (one[1], other[1]))
 
 
 def _signed(problem: Problem, trial: Trial) -> bool:
-    """Whether its sizes may as well be negative."""
+    """Whether the sizes of a trial may be negative."""
     return all(p.low < 0.0 for p in problem.effect_parameters(Candidate(trial.parts)) if p.size)
 
 
 def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
-    """The trial's values with its sizes multiplied; kept within a factor of three, where the line may still be
-    believed.
-    """
+    """The trial's values, SI, with its sizes multiplied by ``factor``.
+
+    The factor is kept from 0.2 to 3: the estimate it comes from is linear, and holds near the trial only."""
     factor = float(np.sign(factor) * np.clip(abs(factor), 0.2, 3.0))
     parameters = problem.effect_parameters(Candidate(trial.parts))
     return tuple(
@@ -237,7 +236,7 @@ def _explained_alone(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array,
 
 
 def _explained_by_pairs(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:
-    """The same for all pairs of trials, (P,), (P, 2), (P, 2); twins that nothing could tell apart, explain nothing."""
+    """The same for all pairs of trials, (P,), (P, 2), (P, 2); pairs that no log could tell apart explain nothing."""
     one, two = np.triu_indices(len(b), 1)
     first, second = (np.maximum(np.diag(gram), 1e-12)[k] * (1.0 + 1e-9) for k in (one, two))
     cross = gram[one, two]

@@ -171,7 +171,9 @@ def _joined(squares: Array) -> Array:
 
 
 def noise_level(problem: Problem) -> float:
-    """What sensor noise and a stated model form leave of the mean square: less than one, sigmas hold a floor beside."""
+    """Mean square, sigma squared, that sensor noise and a stated model form leave on average.
+
+    Less than one: the sigmas of a fit also hold a floor for model form."""
     there = problem.weight > 0.0
     return float(np.sum((problem.weight * problem.expected) ** 2) / max(1, there.sum()))
 
@@ -205,7 +207,7 @@ def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Score
 
 
 def likeliest(refit: Scored, rivals: Sequence[Scored]) -> Scored:
-    """Of structures with as many effects."""
+    """The structure of largest :func:`log_weight` among those of one number of effects, the best of each family set."""
     leaders = [group[0] for group in by_families(rivals).values()]
     return max(leaders, key=lambda one: log_weight(one, refit))
 
