@@ -104,6 +104,7 @@ def diagnose(
             raise InputError("is the half car's own", where=given, key=key, remedy="leave it away with --rig-model")
         diagnose_own(console, rig_model, fit, holdout, output, rig, without or (), save_rig, against, pairs, overwrite)
         return
+    _check_kind(fit)
     _check_files(fit, holdout, edit, rig, effect)
     refuse_old_diagnosis(output, save_rig, overwrite, [rig] if rig is not None else [])
     from pneumo_ros.diagnosis.diagnose import Options
@@ -155,6 +156,16 @@ def _repeated(rig: Path | None, effects: Sequence[Path] | None, without: Sequenc
     words = [("--rig", rig)] if rig is not None else []
     words += [("--effect", path) for path in effects or ()]
     return tuple(str(word) for pair in (*words, *(("--without", name) for name in without or ())) for word in pair)
+
+
+def _check_kind(fit: Sequence[Path]) -> None:
+    """Tables are of rigs of one's own: the half car's log carries its rig."""
+    from pneumo_ros.own_rig.tables import is_table
+
+    for log in fit:
+        if is_table(log) and log.is_file():
+            raise InputError("a table says nothing of its rig", where=log,
+                             remedy="give the model with --rig-model rig.py (docs/your-rig.md)")  # fmt: skip
 
 
 def _check_files(

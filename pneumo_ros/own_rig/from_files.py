@@ -94,6 +94,7 @@ def prepared(
     description = read_description(rig_file_of(model, rig))
     with guard or nullcontext():
         physics, description = _loaded(model, description)
+    _check_apart(fit, holdout)
     records = [read_record(path, description) for path in fit]
     notes = []
     if not physics.kernel.compiled:
@@ -165,6 +166,17 @@ def _loaded(model: Path, description: Description) -> tuple[Physics, Description
     from pneumo_ros.own_rig.fmu.model import load_fmu  # fmpy only where it is needed
 
     return load_fmu(model, description)
+
+
+def _check_apart(fit: Sequence[Path], holdout: Path | None) -> None:
+    """A log counts once, and what is held out is fitted by nothing."""
+    files = [path.resolve() for path in fit]
+    for one, path in zip(files, fit, strict=True):
+        if files.count(one) > 1:
+            raise InputError("the log is given twice", where=path, key="FIT", remedy="give it once")
+    if holdout is not None and holdout.resolve() in files:
+        raise InputError("the held-out log is fitted as well", where=holdout, key="--holdout",
+                         remedy="leave --holdout away: the end of the log is held out then")  # fmt: skip
 
 
 def _check_alike(logs: Sequence[OwnRecord], held: OwnRecord) -> None:

@@ -143,6 +143,9 @@ BAD: dict[str, Change] = {
     "a family that its slot cannot have": names("rig: cart", "rig: cart\nfamilies: {rail: [leak]}"),
     "a column that is not there": names("field: x", "field: y"),
     "a column whose name stands twice": csv(lambda text: text.replace("t,x,force", "t,x,x", 1)),
+    "one log as two": lambda folder: None,
+    "the log that is fitted, held out": lambda folder: None,
+    "a table without --rig-model": lambda folder: None,
     "an empty log": csv(lambda text: ""),
     "a log of names alone": csv(lambda text: text.partition("\n")[0]),
     "more cells in a row than names": csv(lambda text: text.replace("t,x,force", "t,x", 1)),
@@ -173,6 +176,12 @@ BAD: dict[str, Change] = {
     "a bag whose file is missing": bag(metadata_yaml=LISTED),
     "an .mcap file of other bytes": instead("log.mcap", lambda path, _: path.write_bytes(b"12345678" * 9), topics=True),
 }  # fmt: skip
+MODEL = ("log.csv", "--rig-model", "rig.py")
+WORDS = {
+    "one log as two": ("log.csv", *MODEL),
+    "the log that is fitted, held out": (*MODEL, "--holdout", "log.csv"),
+    "a table without --rig-model": ("log.csv",),
+}
 ENDLESS = ("rig.py does not come back", "a loop without end in rhs")
 TAKEN: dict[str, Change] = {
     "semicolons and decimal commas": csv(lambda text: text.replace(",", ";").replace(".", ",")),
@@ -212,12 +221,12 @@ def test_the_page_lists_what_is_tested() -> None:
     assert set(rows()) == set(BAD)
 
 
-def diagnosed(folder: Path, patience: float) -> subprocess.CompletedProcess[str]:
+def diagnosed(folder: Path, given: tuple[str, ...], patience: float) -> subprocess.CompletedProcess[str]:
     """The verb on log.csv, with another patience."""
     program = (
         f"import sys; from pneumo_ros.cli import main, patience; patience.PATIENCE = {patience}; sys.exit(main.main())"
     )
-    words = ["diagnose", "log.csv", "--rig-model", "rig.py", "-o", "out"]
+    words = ["diagnose", *given, "-o", "out"]
     return subprocess.run(
         [sys.executable, "-c", program, *words], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -228,8 +237,9 @@ def test_a_bad_input_is_told_in_one_line(wrong: str, whole: str, tmp_path: Path)
     written(tmp_path)
     (tmp_path / "log.csv").write_text(whole)
     log = BAD[wrong](tmp_path)
-    if wrong in ("rig.py is not there", "rig.yaml is not there", "rig.py ends the program", *ENDLESS):
-        done = diagnosed(tmp_path, patience=12.0 if wrong in ENDLESS else 180.0)
+    words = WORDS.get(wrong, MODEL)
+    if wrong in WORDS or wrong in ("rig.py is not there", "rig.yaml is not there", "rig.py ends the program", *ENDLESS):
+        done = diagnosed(tmp_path, words, patience=12.0 if wrong in ENDLESS else 180.0)
         assert done.returncode == 2 and not (tmp_path / "out" / "report.html").exists()
         said = done.stderr or done.stdout
     else:
