@@ -41,7 +41,7 @@ def effects(
     elif effect in GUIDES:
         _show_family(console, effect)
     else:
-        raise not_one_of("no such effect", effect, [*library, *GUIDES], where="pneumo effects")
+        raise not_one_of("no such effect", effect, list(dict.fromkeys([*library, *GUIDES])), where="pneumo effects")
 
 
 def _list(console: Console, library: Mapping[str, Effect]) -> None:

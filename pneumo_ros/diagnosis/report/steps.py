@@ -35,6 +35,7 @@ class Asked:
     rig : the file of --save-rig; None where none was wanted
     options : of the diagnosis, to be repeated
     rig_options : of ``pneumo run`` for the rig that the logs are of; none for the simulated one
+    program : how ``pneumo`` was called: a path, where the shell would not find the name
     """
 
     fit: tuple[Path, ...] = (Path("FIT.mcap"),)
@@ -43,16 +44,17 @@ class Asked:
     rig: Path | None = None
     options: tuple[str, ...] = ()
     rig_options: tuple[str, ...] = ()
+    program: str = "pneumo"
 
     def diagnosis(self, *further: Path, output: Path, options: tuple[str, ...] = ()) -> str:
         """``pneumo diagnose`` of the same logs and further ones."""
         held = () if self.holdout is None else ("--holdout", self.holdout)
-        words = ("pneumo", "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
+        words = (self.program, "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
         return command(*words)
 
     def session(self, *options: object, output: Path) -> str:
         """``pneumo run`` on the rig that the logs are of."""
-        return command("pneumo", "run", *self.rig_options, *options, "--output", output)
+        return command(self.program, "run", *self.rig_options, *options, "--output", output)
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def _idea(summary: Mapping[str, Any], asked: Asked) -> Step:
 def _keep(summary: Mapping[str, Any], asked: Asked) -> Step:
     none = summary["verdict"] == "none"
     rig = asked.rig or asked.output / "rig.yaml"
-    drive = command("pneumo", "run", "--rig", rig)
+    drive = command(asked.program, "run", "--rig", rig)
     text = "Keep the model, with its parameters as re-estimated." if none else (
         f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
     if asked.rig is not None:

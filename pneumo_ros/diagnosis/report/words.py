@@ -114,7 +114,7 @@ def winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
 def _law_words(effect: str, law: str, phrases: Mapping[str, str]) -> str:
     """A family as the law that was found has it."""
     if law == DIFFERS:
-        return f"{effect_name(effect)} by a law of its own"
+        return f"{effect_name(effect)}, but by another law than the library's"
     return phrases.get(law) or phrases.get(effect) or effect.replace("_", " ")
 
 
