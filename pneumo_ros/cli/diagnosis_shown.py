@@ -61,7 +61,11 @@ def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
     rows = []
     for entry in summary["ranking"][:SHOWN]:
         lost = entry["gap_after"] is None or entry["shrink"] is None
-        left = ("ran away", "") if lost else (f"{entry['gap_after']:.3g}", f"{100 * entry['shrink']:.1f} %")
+        left = (
+            ("ran away", "")
+            if lost
+            else (f"{entry['gap_after']:.3g}", f"{round(100 * entry['shrink'], 1) + 0.0:.1f} %")
+        )
         rows.append((structure_words(entry), f"{entry['probability']:.2f}", *left))
     console.print(simple_table(("what competed", "probability", "gap left", "closed"), rows))
 

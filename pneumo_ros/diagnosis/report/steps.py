@@ -159,7 +159,7 @@ def _keep(summary: Mapping[str, Any], asked: Asked) -> Step:
     if asked.rig is not None:
         return Step(f"{text} {rig} has it, for --rig of every verb:", (drive,))
     save = asked.diagnosis(output=asked.output, options=("--overwrite", "--save-rig", str(rig)))
-    return Step(f"{text} A rig file has it, for --rig of every verb:", (save, drive))
+    return Step(f"{text} The first command writes a rig file with it, for --rig of every verb:", (save, drive))
 
 
 def _record_again(summary: Mapping[str, Any], asked: Asked) -> Step:

@@ -137,7 +137,7 @@ def sentence(text: str) -> str:
 def percent(share: float) -> str:
     """Whole per cent, with a digit more where 99.6 would read as 100."""
     value = 100.0 * share
-    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{value:.0f} %"
+    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{round(value)} %"
 
 
 def interval(low: float, high: float) -> str:

@@ -24,6 +24,7 @@ from pneumo_ros.diagnosis.report.story import _curve_words
 from pneumo_ros.diagnosis.report.words import (
     confidence,
     headline,
+    percent,
     place_words,
 )
 from pneumo_ros.diagnosis.result import Diagnosis, Estimate, Gap, Ranked
@@ -123,6 +124,10 @@ def test_a_measured_law_says_its_units_and_where_half_of_it_is_done() -> None:
     )
     line = {**curve, "points": [[t, t, 0.0, 1.0, 1.0] for t in (0.0, 0.1, 0.2)]}
     assert _curve_words(line) == "share that acts over time after a step: 0 at 0 ms, 0.2 at 200 ms"
+
+
+def test_next_to_nothing_is_not_below_nothing() -> None:
+    assert [percent(share) for share in (-0.0004, 0.0004, -0.012, 0.996)] == ["0 %", "0 %", "-1 %", "99.6 %"]
 
 
 def test_every_verdict_says_what_to_do_next() -> None:
