@@ -8,8 +8,11 @@ later ones do. Resolved hints with ``Optional`` mean the same to all of them.
 from __future__ import annotations
 
 import inspect
+import shutil
+import sys
 import types
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import typer
@@ -47,6 +50,14 @@ class App(typer.Typer):
         """See ``typer.Typer.callback``."""
         register = super().callback(*args, **options)
         return lambda function: register(resolved(function))
+
+
+def program() -> str:
+    """What to type for ``pneumo``: its name, or the path it was called by where the shell does not find it."""
+    called, found = Path(sys.argv[0]), shutil.which("pneumo")
+    if called.name != "pneumo" or (found is not None and Path(found).resolve() == called.resolve()):
+        return "pneumo"
+    return str(called)
 
 
 def paragraphs(function: Callable[..., Any]) -> str:

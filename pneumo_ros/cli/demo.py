@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pneumo_ros.cli.app import App
+from pneumo_ros.cli.app import App, program
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
 
@@ -54,7 +54,9 @@ def demo(
     console.rule("[bold]the answer[/]", align="left")
     _open(console, folder, digest)
     console.print(f"report   {folder / 'report' / 'report.html'}", soft_wrap=True)
-    console.print(f"{time.monotonic() - began:.0f} s in all; another rig: pneumo demo --seed {seed + 1}")
+    console.print(
+        f"{time.monotonic() - began:.0f} s in all; another rig: {program()} demo --seed {seed + 1}", soft_wrap=True
+    )
 
 
 def _tell(console: Console, number: int, what: str) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from pneumo_ros.cli.app import App
+from pneumo_ros.cli.app import App, program
 from pneumo_ros.cli.diagnose_against import check_against, fitted_half_car
 from pneumo_ros.cli.diagnosis_shown import progress_bar, show
 from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
@@ -131,14 +131,15 @@ def diagnose(
     with progress_bar(console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without), _bench(fit[0]))
+    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without), _bench(fit[0]), program())
     files, first = write_outputs(output, found, task.model, task.fit, task.holdout, asked=asked)
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
         files.append(save_corrected_rig(found, task.model, save_rig))
     show(console, found, first)
-    console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+    for file in files:
+        console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _bench(log: Path) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from pneumo_ros.cli.app import program
 from pneumo_ros.cli.diagnose_against import fitted_own
 from pneumo_ros.cli.existing import refuse_old_diagnosis
 from pneumo_ros.cli.patience import answered
@@ -59,14 +60,15 @@ def diagnose_own(
         options = Options(pairs=pairs, threads=threads, experiment=design_own)
         found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
     named = ("--rig-model", str(model), *(() if rig_asked is None else ("--rig", str(rig_asked))))
-    asked = Asked(tuple(fit), holdout, output, save_rig, named)
+    asked = Asked(tuple(fit), holdout, output, save_rig, named, program=program())
     files, first = outputs.write_outputs(output, found, task.model, task.fit, task.holdout, asked)
     if found.experiment is not None:
         files += found.experiment.write(output)
     if save_rig is not None:
         files.append(outputs.save_rig(found, task.model, save_rig))
     show(console, found, first)
-    console.print("written: " + ", ".join(str(file) for file in files), highlight=False, soft_wrap=True)
+    for file in files:
+        console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _check_files(fit: Sequence[Path], holdout: Path | None, model: Path, rig: Path) -> None:

@@ -49,9 +49,9 @@ def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
     for row in budget_rows(summary):
         entry = row.get("entry", {})
         probability = f"{entry['probability']:.2f}" if entry else ""
-        law = {"": "", DIFFERS: "another than the library's"}.get(str(entry.get("law", "")), "the library's")
+        law = {"": "", DIFFERS: "another"}.get(str(entry.get("law", "")), "the library's")
         rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
-    console.print(simple_table(("of the nominal model's gap", "share", "law", "probability"), rows))
+    console.print(simple_table(("what makes the nominal model's gap", "share", "law", "probability"), rows))
 
 
 def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
@@ -61,7 +61,8 @@ def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:
     rows, shown = [], summary["ranking"][:SHOWN]
     for entry, words in zip(shown, ranking_words(shown), strict=True):
         lost = entry["gap_after"] is None or entry["shrink"] is None
-        left = ("ran away", "") if lost else (f"{entry['gap_after']:.3g}", f"{100 * entry['shrink']:.1f} %")
+        closed = "" if lost else f"{round(100 * entry['shrink'], 1) + 0.0:.1f} %"
+        left = ("ran away", "") if lost else (f"{entry['gap_after']:.3g}", closed)
         rows.append((words, f"{entry['probability']:.2f}", *left))
     console.print(simple_table(("what competed", "probability", "gap left", "closed"), rows))
 

@@ -41,7 +41,7 @@ def effects(
     elif effect in GUIDES:
         _show_family(console, effect)
     else:
-        raise not_one_of("no such effect", effect, [*library, *GUIDES], where="pneumo effects")
+        raise not_one_of("no such effect", effect, list(dict.fromkeys([*library, *GUIDES])), where="pneumo effects")
 
 
 def _list(console: Console, library: Mapping[str, Effect]) -> None:
@@ -64,7 +64,7 @@ def _show(console: Console, effect: Effect) -> None:
     console.print(f"[bold]{effect.id}[/]: {escape(effect.summary)}")
     if effect.guide is not None:
         console.print(escape(effect.guide.meaning))
-    console.print(f"\n[bold]acts at[/] {sites_of(effect)}; [bold]blamed on[/] {places_of(effect)}")
+    console.print(f"\n[bold]acts at[/] {sites_of(effect)}; [bold]a report shows it at[/] {places_of(effect)}")
     if effect.id in SLOT_FAMILIES:
         kind, family, *_ = SLOT_FAMILIES[effect.id]
         console.print(f"[bold]at a rig of your own[/]: {family} at a slot of kind {kind} (--rig-model)")
@@ -72,10 +72,9 @@ def _show(console: Console, effect: Effect) -> None:
     if effect.guide is None:
         return
     console.print(f"[bold]by hand[/] (with typical values): {escape(check_words(effect))}")
-    for other, difference in effect.guide.mistaken_for.items():
-        console.print(f"[bold]not {other}[/]: {escape(difference)}")
+    _show_alike(console, effect.guide.mistaken_for)
     size = effect.parameters[0]
-    console.print(f"a first guess is {displayed(size.typical, size.unit)}")
+    console.print(f"[bold]typical size[/]: {displayed(size.typical, size.unit)}")
 
 
 def _show_family(console: Console, family: str) -> None:
@@ -90,8 +89,17 @@ def _show_family(console: Console, family: str) -> None:
     console.print(f"[bold]{family}[/], at slots of a rig of your own: {escape(guide.meaning)}\n")
     console.print(plain_table(("law", "at", "what it is"), laws_of_family(family)))
     console.print(f"[bold]by hand[/]: {escape(plain_check(guide))}")
-    for other, difference in guide.mistaken_for.items():
-        console.print(f"[bold]not {other}[/]: {escape(difference)}")
+    _show_alike(console, guide.mistaken_for)
+
+
+def _show_alike(console: Console, others: Mapping[str, str]) -> None:
+    """What looks like an effect, and what tells it apart."""
+    from rich.markup import escape
+
+    if others:
+        console.print("[bold]looks like it[/], and what tells it apart:")
+    for other, difference in others.items():
+        console.print(f"  {other}: {escape(difference)}")
 
 
 if __name__ == "__main__":

@@ -334,6 +334,8 @@ def _show_comparison(result: Comparison) -> None:
     console.print(settings if result.settings else "same settings")
     counts = Table("topic", "first", "second", "payload", title="Messages", title_justify="left", box=SIMPLE_HEAD)
     for name, (a, b) in result.counts.items():
+        if a == b == 0:
+            continue  # of nothing there is nothing to compare
         counts.add_row(name, str(a), str(b), "equal byte by byte" if name in result.identical else "differs")
     console.print(counts)
     console.print(_signals_table(result))

@@ -14,10 +14,11 @@ def sites_of(effect: Effect) -> str:
 
 
 def places_of(effect: Effect) -> str:
-    """Places it is blamed on, as the diagnosis writes them."""
+    """Places that a report shows it at, as the diagnosis file writes them."""
     if not effect.places:
         return ", ".join(SENSOR_PLACES[site] for site in effect.sites if site in SENSOR_PLACES)
-    return ", ".join(place.replace("{end}", "front|rear") for place in effect.places)
+    ends = [(place, end) for place in effect.places for end in (("front", "rear") if "{end}" in place else ("",))]
+    return ", ".join(place.replace("{end}", end) for place, end in ends)
 
 
 def parameter_rows(effect: Effect) -> list[tuple[str, ...]]:
@@ -41,10 +42,11 @@ def effects_page(library: Mapping[str, Effect]) -> str:
 def _section(effect: Effect) -> str:
     guide = effect.guide
     lines = [f"## {effect.id}", "", f"{guide.meaning if guide else effect.summary}", ""]
-    lines += [f"Acts at {sites_of(effect)}; blamed on `{places_of(effect)}`.", ""]
+    lines += [f"Acts at {sites_of(effect)}; a report shows it at `{places_of(effect)}`.", ""]
     lines += ["| parameter | typical | from | to | unit | what it is |", "|---|---|---|---|---|---|"]
     lines += ["| `" + "` | ".join((row[0], " | ".join(row[1:]))) + " |" for row in parameter_rows(effect)]
     if guide is not None:
         lines += ["", f"**By hand** (with typical values): {check_words(effect)}.", ""]
-        lines += [f"- not `{other}`: {difference}" for other, difference in guide.mistaken_for.items()]
+        lines += ["What looks like it, and what tells it apart:", ""] if guide.mistaken_for else []
+        lines += [f"- `{other}`: {difference}" for other, difference in guide.mistaken_for.items()]
     return "\n".join(lines) + "\n"

@@ -21,6 +21,7 @@ from rcl_interfaces.msg import (
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -34,6 +35,7 @@ from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
 from pneumo_ros.nodes.delivery import DELIVERY_PATIENCE, delivered
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
@@ -94,7 +96,14 @@ class RigNode(Node):
     context : private context, or None for the default one
     overrides : parameter values that win over files and arguments
     owns_time : whether samples get their time here: such a node cannot follow /clock, whatever use_sim_time says
+    hand_over : of the nodes of one process; used in lockstep, where every message counts
+
+    Attributes
+    ----------
+    takes_at_once : whether what is handed over to it is only kept, in no time
     """
+
+    takes_at_once = False
 
     def __init__(
         self,
@@ -104,6 +113,7 @@ class RigNode(Node):
         context: Context | None = None,
         overrides: Mapping[str, Value] | None = None,
         owns_time: bool = False,
+        hand_over: HandOver | None = None,
     ) -> None:
         given = {**(overrides or {}), **({"use_sim_time": False} if owns_time else {})}
         super().__init__(
@@ -115,6 +125,7 @@ class RigNode(Node):
         self.table = {p.name: p for p in (*COMMON, *table)}
         self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
         self.lockstep = self.values["mode"] == "lockstep"
+        self.hand_over = hand_over if self.lockstep else None
         if "daq" in str(self.values["session_nodes"]).split(",") and name != "session_recorder":
             prefer_this_process()  # hardware does not wait for other programs; the recorder may
         self.period_ns = round(1e9 / self.values["rate_hz"])
@@ -201,9 +212,20 @@ class RigNode(Node):
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the table."""
-        made = self.create_publisher(
-            message_class(topic.type), topic.relative, publisher_qos(topic.flow, self.lockstep)
-        )
+        return self._publisher(topic)
+
+    def sender(self, topic: Topic) -> Callable[[bytes], None]:
+        """Create the publisher of a topic of the table; what sends serialised bytes with it, or hands them over."""
+        if self.hand_over is None or not self.hand_over.covers(topic):
+            send: Callable[[bytes], None] = self._publisher(topic).handle.publish_raw
+            return send
+        outlet = self.hand_over.outlet(topic)
+        outlet.attach(self._publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
+        return outlet.publish
+
+    def _publisher(self, topic: Topic, **options: Any) -> Publisher:
+        qos = publisher_qos(topic.flow, self.lockstep)
+        made = self.create_publisher(message_class(topic.type), topic.relative, qos, **options)
         self._outgoing.append((topic, made))
         return made
 
@@ -216,6 +238,9 @@ class RigNode(Node):
         )  # fmt: skip
         source.attach(made)
         self.sources.append(source)
+        if self.hand_over is not None and self.hand_over.covers(topic):
+            source.unheard()
+            self.hand_over.take(topic, callback, at_once=self.takes_at_once)
         return source
 
     def on_other_publisher(self, source: SoleSource, text: str) -> None:
@@ -262,6 +287,8 @@ class RigNode(Node):
             if source.topic.publisher:
                 source.held = bool(self.values["session_id"])
                 source.refuse_other_publisher(self.readiness.publishers(source.topic))
+        if self.hand_over is not None:
+            self.hand_over.begin(self.steady_timer)
         if not self.stop.set:
             self.on_begin()
 

@@ -16,6 +16,7 @@ from pneumo_ros.daq.safety_config import load_safety
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder
 from pneumo_ros.nodes.base import ERROR, WARN
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.nodes.stage import StageNode
 from pneumo_ros.parameters import Parameter, Value
@@ -38,12 +39,17 @@ class ControllerNode(StageNode[ControllerStage]):
     driver and the board behind it do.
     """
 
-    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("controller", PARAMETERS, ControllerStage, context, overrides)
+    def __init__(
+        self,
+        context: Context | None = None,
+        overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
+    ) -> None:
+        super().__init__("controller", PARAMETERS, ControllerStage, context, overrides, hand_over)
         self._command = JointEncoder(topics.COMMAND.frame_id, topics.COMMAND.names).encode_array
         self._sliding = JointEncoder(topics.SLIDING.frame_id, topics.SLIDING.names).encode_array
-        self._publish = self.publisher(topics.COMMAND).publish
-        self._publish_sliding = self.publisher(topics.SLIDING).publish
+        self._publish = self.sender(topics.COMMAND)
+        self._publish_sliding = self.sender(topics.SLIDING)
         self._read = JointDecoder(topics.ESTIMATE.name, topics.ESTIMATE.names).decode_array
         self._steps = 0
         self._last_ns = self._last_stamp = self._said = 0

@@ -12,6 +12,7 @@ from rclpy.context import Context
 from pneumo_ros.estimation.half_car import PARAMETERS
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder, decode_pressure
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.nodes.stage import StageNode
 from pneumo_ros.parameters import Value
@@ -21,12 +22,17 @@ from pneumo_ros.session.stages import EstimatorStage
 class EstimatorNode(StageNode[EstimatorStage]):
     """Thin shell over :class:`~pneumo_ros.session.stages.EstimatorStage`."""
 
-    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("estimator", PARAMETERS, EstimatorStage, context, overrides)
+    def __init__(
+        self,
+        context: Context | None = None,
+        overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
+    ) -> None:
+        super().__init__("estimator", PARAMETERS, EstimatorStage, context, overrides, hand_over)
         self._sample = np.zeros(6)
         self._stamps = [0, 0, 0]
         self._encode = JointEncoder(topics.ESTIMATE.frame_id, topics.ESTIMATE.names).encode_array
-        self._publish = self.publisher(topics.ESTIMATE).publish
+        self._publish = self.sender(topics.ESTIMATE)
         self._read = JointDecoder(topics.DISPLACEMENT.name, topics.DISPLACEMENT.names).decode_array
         self.subscribe(topics.DISPLACEMENT, self._on_displacement)
         self.subscribe(topics.FRONT_PRESSURE, lambda data: self._on_pressure(1, data))

@@ -17,6 +17,7 @@ from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointDecoder, JointEncoder, PressureEncoder, encode_clock
 from pneumo_ros.nodes.base import OK, RigNode, say, tell_end
 from pneumo_ros.nodes.emergency_stop import EmergencyStop
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.plant.sensors import NoiseSource
@@ -46,8 +47,13 @@ PARAMETERS: tuple[Parameter, ...] = (
 class PlantNode(RigNode):
     """Thin shell over :mod:`pneumo_ros.plant.stepping`: the nominal equations, or the rig as it was diagnosed."""
 
-    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("plant", PARAMETERS, context=context, overrides=overrides, owns_time=True)
+    def __init__(
+        self,
+        context: Context | None = None,
+        overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
+    ) -> None:
+        super().__init__("plant", PARAMETERS, context=context, overrides=overrides, owns_time=True, hand_over=hand_over)
         self.rig = load_rig(self.values["rig"] or None)
         real = load_rig(self.values["simulated_rig"]) if self.values["simulated_rig"] else self.rig
         self.stepped = stepped_rig(real, self.period_ns / SECOND)
@@ -72,9 +78,9 @@ class PlantNode(RigNode):
         self._displacement = JointEncoder(topics.DISPLACEMENT.frame_id, topics.DISPLACEMENT.names)
         self._truth = JointEncoder(topics.TRUTH.frame_id, topics.TRUTH.names)
         self._pressures = [PressureEncoder(t.frame_id, variance) for t in (topics.FRONT_PRESSURE, topics.REAR_PRESSURE)]
-        self._send_measurement = [self.publisher(t).publish for t in topics.MEASUREMENTS]
-        self._publish_truth = self.publisher(topics.TRUTH).publish
-        self._send_clock = self.publisher(topics.CLOCK).publish if self.lockstep else None
+        self._send_measurement = [self.sender(t) for t in topics.MEASUREMENTS]
+        self._publish_truth = self.sender(topics.TRUTH)
+        self._send_clock = self.sender(topics.CLOCK) if self.lockstep else None
         self.publisher(topics.CONFIG).publish(String(data=self.rig.to_yaml()))
         self._read_command = JointDecoder(topics.COMMAND.name, topics.COMMAND.names).decode_array
         self._read_road = JointDecoder(topics.ROAD.name, topics.ROAD.names).decode_array

@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointEncoder, stamp_of
 from pneumo_ros.nodes.base import RigNode
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import load_rig
@@ -25,15 +26,20 @@ LEAD = 16  # samples ahead of the clock, which ticks every few periods only (pla
 class RoadProfileNode(RigNode):
     """Thin shell over :mod:`pneumo_ros.road`."""
 
-    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("road_profile", PARAMETERS, context=context, overrides=overrides)
+    def __init__(
+        self,
+        context: Context | None = None,
+        overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
+    ) -> None:
+        super().__init__("road_profile", PARAMETERS, context=context, overrides=overrides, hand_over=hand_over)
         rig = load_rig(self.values["rig"] or None)
         wanted = {p.name: self.values[p.name] for p in PARAMETERS}
         self.road = build_road(
             wanted, wheelbase=rig.wheelbase, length_scale=rig.length_scale.value, where=self.get_name()
         )
         self._encode = JointEncoder(topics.ROAD.frame_id, topics.ROAD.names, with_velocity=True).encode
-        self._publish = self.publisher(topics.ROAD).publish
+        self._publish = self.sender(topics.ROAD)
         self._start: int | None = None
         self._sent = -1
         self._block = -1

@@ -20,6 +20,7 @@ from pneumo_ros.log.provenance import versions
 from pneumo_ros.log.topics import APPLIED, EVENTS, EVERY_PERIOD, JOINT, PRESSURE, TOPICS, Topic
 from pneumo_ros.log.writing import AT_LATEST, AT_STAMP, Channel, LogWriter, Written
 from pneumo_ros.nodes.base import ERROR, WARN, RigNode
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.qos import publisher_qos, recorder_qos, rosbag2_qos
 from pneumo_ros.nodes.spin import node_main
@@ -41,8 +42,15 @@ PARAMETERS: tuple[Parameter, ...] = (
 class SessionRecorderNode(RigNode):
     """Thin shell over :mod:`pneumo_ros.log.writing`."""
 
-    def __init__(self, context: Context | None = None, overrides: Mapping[str, Value] | None = None) -> None:
-        super().__init__("session_recorder", PARAMETERS, context=context, overrides=overrides)
+    takes_at_once = True
+
+    def __init__(
+        self,
+        context: Context | None = None,
+        overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
+    ) -> None:
+        super().__init__("session_recorder", PARAMETERS, context=context, overrides=overrides, hand_over=hand_over)
         self.writer = LogWriter(Path(self.values["output"]), self._metadata())
         self.written: Written | None = None
         self._warned = False

@@ -66,6 +66,10 @@ class SoleSource:
         """The subscription it is about."""
         self._subscription, self._callback = subscription, subscription.callback
 
+    def unheard(self) -> None:
+        """Watch for publishers only: the messages come another way."""
+        self._subscription.callback = self._callback = _forget
+
     def mute(self) -> None:
         """Use nothing more that arrives, whoever sent it, until one publisher is left."""
         self._subscription.callback = _forget

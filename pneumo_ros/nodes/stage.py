@@ -10,6 +10,7 @@ from rclpy.context import Context
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.nodes.base import RigNode
+from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.rig import Rig, load_rig
 from pneumo_ros.session.stages import Output, Progress, Stage, advance
@@ -22,7 +23,7 @@ class StageNode(RigNode, Generic[S]):
 
     Parameters
     ----------
-    name, table, context, overrides : as of :class:`~pneumo_ros.nodes.base.RigNode`
+    name, table, context, overrides, hand_over : as of :class:`~pneumo_ros.nodes.base.RigNode`
     build : rig, control period in s, values of the parameters -> the stage
     """
 
@@ -33,8 +34,9 @@ class StageNode(RigNode, Generic[S]):
         build: Callable[[Rig, float, Mapping[str, Value]], S],
         context: Context | None = None,
         overrides: Mapping[str, Value] | None = None,
+        hand_over: HandOver | None = None,
     ) -> None:
-        super().__init__(name, table, context=context, overrides=overrides)
+        super().__init__(name, table, context=context, overrides=overrides, hand_over=hand_over)
         self.rig = load_rig(self.values["rig"] or None)
         self._build = build
         self.stage = build(self.rig, self.period_ns * 1e-9, self.values)

@@ -11,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from pneumo_ros.cli.app import program
 from pneumo_ros.cli.existing import DIAGNOSIS_FILES
 from pneumo_ros.cli.main import VERBS
 from pneumo_ros.diagnosis.report.outputs import FILES
+from pneumo_ros.diagnosis.report.steps import Asked
 
 # What takes longest to import, each a few tenths of a second or more.
 HEAVY = ("rclpy", "scipy.stats", "scipy.signal", "scipy.optimize", "matplotlib", "bokeh.models", "pandas", "dask")
@@ -90,3 +92,20 @@ def test_help_fills_the_lines_of_the_terminal(tmp_path: Path) -> None:
 
 def test_what_refuses_to_overwrite_knows_what_is_written() -> None:
     assert DIAGNOSIS_FILES == FILES
+
+
+def test_a_command_to_copy_is_one_that_the_shell_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After `make demo` nobody has .venv/bin on the path."""
+    script = tmp_path / "bin" / "pneumo"
+    script.parent.mkdir()
+    script.write_text("#!/bin/sh\n")
+    script.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["bin/pneumo"])
+    monkeypatch.setenv("PATH", "/usr/bin:/bin")
+    assert program() == "bin/pneumo"
+    assert Asked(program=program()).session("--road", "E", output=Path("x.mcap")).startswith("bin/pneumo run --road E")
+    monkeypatch.setenv("PATH", str(script.parent))
+    assert program() == "pneumo"
+    monkeypatch.setattr(sys, "argv", ["-m"])
+    assert program() == "pneumo"

@@ -77,6 +77,9 @@ def test_compare_says_units_roads_and_rigs(logs: tuple[Path, Path, Path], width:
     text = said("compare", logs[0], logs[1], width=width)
     assert "two rigs: sprung_mass differ" in text and "same road; the second log is moved by -1.000 s" in text
     assert "kPa" in text and "mm2" in text and "nan" not in text and "…" not in text.split("Signals")[1]
+    rows = [line.split() for line in text.split("Messages")[1].split("Signals")[0].splitlines()]
+    assert ["/rig/displacement"] in [row[:1] for row in rows]
+    assert all(row[1:3] != ["0", "0"] for row in rows), "a topic that neither log has is not equal byte by byte"
     other = said("compare", logs[0], logs[2], width=width)
     assert "two roads" in other and "session_id" not in other and "…" not in other.split("Signals")[1]
 

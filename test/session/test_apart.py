@@ -15,12 +15,15 @@ import pytest
 pytest.importorskip("rclpy")
 import rclpy
 from helpers import sessions
+from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 
 from pneumo_ros.log import topics
+from pneumo_ros.log.cdr import stamp_of
 from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.neighbours import LOOK_FOR, neighbours
+from pneumo_ros.nodes.qos import recorder_qos
 from pneumo_ros.session.claim import Claim, runtime_folder
 
 QUIET = ("--seed", "5", "--no-picture", "--no-report", "--no-summary")
@@ -115,6 +118,32 @@ def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_us
     assert process.returncode == 1 and "2 nodes publish /valve/command" in said and "/intruder" in said, said
     log = read_log(path)
     assert ending(log)["complete"] == "false" and "/valve/command" in ending(log)["reason"]
+    same_as_alone(alone, log, whole=False)
+
+
+@pytest.mark.slow
+def test_a_listener_outside_of_one_process_hears_what_its_nodes_hand_over(tmp_path: Path, alone: Log) -> None:
+    domain, path = sessions.own_domain(), tmp_path / "x.mcap"
+    process = sessions.start(*ENDLESS, "--single-process", "--output", str(path), domain=domain)
+    sessions.wait_for(process, path.with_name("x.mcap.part"), 100_000)
+    heard: list[bytes] = []
+    with sessions.own_context(domain) as context:
+        node = rclpy.create_node("listener", context=context)
+        qos = recorder_qos(topics.ESTIMATE.flow)
+        node.create_subscription(JointState, topics.ESTIMATE.name, heard.append, qos, raw=True)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        end = time.monotonic() + 60.0
+        while len(heard) < 500 and time.monotonic() < end:
+            executor.spin_once(timeout_sec=0.1)
+        executor.shutdown()
+    process.send_signal(2)
+    said, _ = process.communicate(timeout=180)
+    assert process.returncode == 0, said
+    log = read_log(path)
+    stamps = np.array([stamp_of(data) for data in heard[:500]])
+    assert len(stamps) == 500 and (np.diff(stamps) == 2_000_000).all(), "whoever joins misses nothing from then on"
+    assert ending(log)["complete"] == "true"
     same_as_alone(alone, log, whole=False)
 
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.judge.verdict import Calibration
 from pneumo_ros.diagnosis.report.card import ToldEffect
 from pneumo_ros.diagnosis.report.quantities import quantity_row, quantity_words, readable
@@ -30,6 +31,7 @@ from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
 OFTEN: Final = 0.05  # of the density where a log was most often, from which a measured law is told there [display]
+ASIDE: Final = 0.3  # of its range off the middle, from which a law is told where half of it is done [display]
 PEAK: Final = 1.5  # times either end, from which a measured law is told at its peak [display]
 MOVED: Final = 1.0  # tolerances from which a parameter of the rig is worth telling [display]
 
@@ -58,7 +60,7 @@ def places(summary: Mapping[str, Any]) -> str:
     if not shown:
         return "no place stands out"
     words = [f"{place_words(place)} {share} %" for (place, _), share in zip(shown, shares, strict=True)]
-    return f"{', '.join(words)} of the gap"
+    return f"{', '.join(words)} of the gap that re-estimated parameters leave"
 
 
 def sizes(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> list[str]:
@@ -238,12 +240,24 @@ def _curve_words(curve: Mapping[str, Any]) -> str:
     often = points[points[:, 4] >= OFTEN * points[:, 4].max()] if points.shape[1] > 4 else points
     x, y = curve["x"], curve["y"]
     (along, x_factor), (up, y_factor) = (readable(axis["unit"], often[:, k]) for k, axis in enumerate((x, y)))
+    along, up = ("" if unit == "1" else f" {unit}" for unit in (along, up))
     low, high, top = (often[k, :2] * (x_factor, y_factor) for k in (0, -1, int(np.argmax(often[:, 1]))))
     if top[1] > PEAK * max(abs(low[1]), abs(high[1])):
-        return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
-                f"at most {top[1]:.3g} {up} at {top[0]:.3g} {along}")  # fmt: skip
-    return (f"{y['name']} over {x['name']}: {low[1]:.3g} {up} at {low[0]:.3g} {along}, "
-            f"{high[1]:.3g} {up} at {high[0]:.3g} {along}")  # fmt: skip
+        return (f"{y['name']} over {x['name']}: {low[1]:.3g}{up} at {low[0]:.3g}{along}, "
+                f"at most {top[1]:.3g}{up} at {top[0]:.3g}{along}")  # fmt: skip
+    half = _half_way(often[:, :2] * (x_factor, y_factor), along)
+    return (f"{y['name']} over {x['name']}: {low[1]:.3g}{up} at {low[0]:.3g}{along}, "
+            f"{high[1]:.3g}{up} at {high[0]:.3g}{along}{half}")  # fmt: skip
+
+
+def _half_way(points: Array, along: str) -> str:
+    """Where a law that rises or falls all the way has done half of it; '' where both ends tell as much."""
+    x, y = points[:, 0], points[:, 1]
+    done = (y - y[0]) / (y[-1] - y[0] or 1.0)
+    if len(x) < 3 or x[-1] <= x[0] or (np.diff(done) < -1e-9).any() or done[-1] != 1.0:
+        return ""
+    half = float(np.interp(0.5, done, x))
+    return f", half of the way at {half:.3g}{along}" if abs((half - x[0]) / (x[-1] - x[0]) - 0.5) > ASIDE else ""
 
 
 def unseen(summary: Mapping[str, Any]) -> str:

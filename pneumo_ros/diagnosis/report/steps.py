@@ -35,6 +35,7 @@ class Asked:
     rig : the file of --save-rig; None where none was wanted
     options : of the diagnosis, to be repeated
     rig_options : of ``pneumo run`` for the rig that the logs are of; none for the simulated one
+    program : how ``pneumo`` was called: a path, where the shell would not find the name
     """
 
     fit: tuple[Path, ...] = (Path("FIT.mcap"),)
@@ -43,16 +44,17 @@ class Asked:
     rig: Path | None = None
     options: tuple[str, ...] = ()
     rig_options: tuple[str, ...] = ()
+    program: str = "pneumo"
 
     def diagnosis(self, *further: Path, output: Path, options: tuple[str, ...] = ()) -> str:
         """``pneumo diagnose`` of the same logs and further ones."""
         held = () if self.holdout is None else ("--holdout", self.holdout)
-        words = ("pneumo", "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
+        words = (self.program, "diagnose", *self.fit, *further, *held, *self.options, "--output", output, *options)
         return command(*words)
 
     def session(self, *options: object, output: Path) -> str:
         """``pneumo run`` on the rig that the logs are of."""
-        return command("pneumo", "run", *self.rig_options, *options, "--output", output)
+        return command(self.program, "run", *self.rig_options, *options, "--output", output)
 
 
 @dataclass(frozen=True)
@@ -151,13 +153,13 @@ def _idea(summary: Mapping[str, Any], asked: Asked) -> Step:
 def _keep(summary: Mapping[str, Any], asked: Asked) -> Step:
     none = summary["verdict"] == "none"
     rig = asked.rig or asked.output / "rig.yaml"
-    drive = command("pneumo", "run", "--rig", rig)
+    drive = command(asked.program, "run", "--rig", rig)
     text = "Keep the model, with its parameters as re-estimated." if none else (
         f"Look at {first_place(summary) or 'it'} on the rig, or keep the effect in the model.")  # fmt: skip
     if asked.rig is not None:
         return Step(f"{text} {rig} has it, for --rig of every verb:", (drive,))
     save = asked.diagnosis(output=asked.output, options=("--overwrite", "--save-rig", str(rig)))
-    return Step(f"{text} A rig file has it, for --rig of every verb:", (save, drive))
+    return Step(f"{text} The first command writes a rig file with it, for --rig of every verb:", (save, drive))
 
 
 def _record_again(summary: Mapping[str, Any], asked: Asked) -> Step:

@@ -114,7 +114,7 @@ def winner(summary: Mapping[str, Any]) -> Mapping[str, Any]:
 def _law_words(effect: str, law: str, phrases: Mapping[str, str]) -> str:
     """A family as the law that was found has it."""
     if law == DIFFERS:
-        return f"{effect_name(effect)} by a law of its own"
+        return f"{effect_name(effect)}, but by another law than the library's"
     return phrases.get(law) or phrases.get(effect) or effect.replace("_", " ")
 
 
@@ -137,7 +137,7 @@ def sentence(text: str) -> str:
 def percent(share: float) -> str:
     """Whole per cent, with a digit more where 99.6 would read as 100."""
     value = 100.0 * share
-    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{value:.0f} %"
+    return f"{value:.1f} %" if 98.5 < value < 100.0 else f"{round(value)} %"
 
 
 def interval(low: float, high: float) -> str:

@@ -21,9 +21,11 @@ from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.quantities import readable, rounded
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
 from pneumo_ros.diagnosis.report.steps import Asked, next_steps
+from pneumo_ros.diagnosis.report.story import _curve_words
 from pneumo_ros.diagnosis.report.words import (
     confidence,
     headline,
+    percent,
     place_words,
     ranking_words,
 )
@@ -107,7 +109,26 @@ def test_a_pair_is_named_with_both_effects() -> None:
     assert words == "At the front, a leak; and at both ends, a slow valve."
     summary["budget"] = [{"effects": ["leak"], "law": "differs"}, {"effects": ["valve_lag"], "law": "valve_lag.second"}]
     words = headline(summary, {"leak": "a leak", "valve_lag": "a slow valve", "valve_lag.second": "a valve that rings"})
-    assert words == "At the front, leak by a law of its own; and at both ends, a valve that rings."
+    assert words == "At the front, leak, but by another law than the library's; and at both ends, a valve that rings."
+
+
+def test_a_measured_law_says_its_units_and_where_half_of_it_is_done() -> None:
+    points = [[t, min(t / 0.03, 1.0), 0.0, 1.0, 1.0] for t in np.linspace(0.0, 0.3, 61)]
+    curve = {
+        "x": {"name": "time after a step", "unit": "s"},
+        "y": {"name": "share that acts", "unit": "1"},
+        "points": points,
+    }
+    assert (
+        _curve_words(curve)
+        == "share that acts over time after a step: 0 at 0 ms, 1 at 300 ms, half of the way at 15 ms"
+    )
+    line = {**curve, "points": [[t, t, 0.0, 1.0, 1.0] for t in (0.0, 0.1, 0.2)]}
+    assert _curve_words(line) == "share that acts over time after a step: 0 at 0 ms, 0.2 at 200 ms"
+
+
+def test_next_to_nothing_is_not_below_nothing() -> None:
+    assert [percent(share) for share in (-0.0004, 0.0004, -0.012, 0.996)] == ["0 %", "0 %", "-1 %", "99.6 %"]
 
 
 def test_every_verdict_says_what_to_do_next() -> None:
@@ -244,7 +265,7 @@ def test_all_files_of_a_diagnosis_are_written(tmp_path: Path) -> None:
     assert [path.name for path in written] == ["diagnosis.json", "report.html", "residual.mcap"]
     assert sorted((tmp_path / "new").iterdir()) == sorted(written), "nothing else: no .part, no metadata.yaml"
     page = written[1].read_text()
-    assert ("where", "the front air and valve 98 % of the gap") in first.facts
+    assert ("where", "the front air and valve 98 % of the gap that re-estimated parameters leave") in first.facts
     assert dict(first.facts)["how big"] == "leak area 0.4000 ± 0.0010 mm²"
     assert "missing inflow" in page and "seen in the balance of the front air" in page
     assert json.loads(written[0].read_text())["verdict"] == "leak"
