@@ -44,4 +44,4 @@ def test_every_package_of_the_lock_is_pinned_with_hashes() -> None:
         assert re.match(r"[a-z0-9._-]+==[0-9][^ ]*( ; [^\\]+)? \\\n", entry), entry
         assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8")
-    assert re.search(r"pip install [^\n]*--require-hashes \\\n\t\t-r requirements\.lock", recipe)
+    assert re.search(r"pip install [^\n]*\\\n\t\t--require-hashes -r requirements\.lock\n", recipe)

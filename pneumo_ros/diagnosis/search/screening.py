@@ -172,8 +172,9 @@ def _candidate_scores(
 def compatible(model: Model, one: Part, other: Part) -> bool:
     """Whether two effects may act together: not two sensors' errors, and not one family at overlapping sites.
 
-    Two sensor errors at once imitate almost anything (an unknown load moves body and axle alike, a resonance moves
-    everything), so a second one is only looked for after the first is part of the structure."""
+    Two sensor errors at once imitate almost anything (an unknown load moves several channels alike, a resonance moves
+    all), so a second one is only looked for after the first is part of the structure.
+    """
     if all(model.places(Active(*part, ()))[0].startswith(SENSOR) for part in (one, other)):
         return False
     return family_of(one[0]) != family_of(other[0]) or (one[1] != other[1] and "both" not in (one[1], other[1]))

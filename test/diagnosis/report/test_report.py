@@ -17,11 +17,11 @@ from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.diagnosis.half_car.signals import MEASURED
 from pneumo_ros.diagnosis.report import render, write_outputs, write_report, write_residual_log
+from pneumo_ros.diagnosis.report.facts import _curve_words
 from pneumo_ros.diagnosis.report.plots import Line, plot, thinned, ticks
 from pneumo_ros.diagnosis.report.quantities import readable, rounded
 from pneumo_ros.diagnosis.report.rig_map import colour, draw_map
 from pneumo_ros.diagnosis.report.steps import Asked, next_steps
-from pneumo_ros.diagnosis.report.story import _curve_words
 from pneumo_ros.diagnosis.report.words import (
     confidence,
     headline,
