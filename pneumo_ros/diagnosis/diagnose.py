@@ -20,6 +20,7 @@ from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
 from pneumo_ros.diagnosis.judge.closable import Closable, EffectEvidence, closable
 from pneumo_ros.diagnosis.judge.effect_shares import effect_shares
+from pneumo_ros.diagnosis.judge.equations import Equations
 from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
@@ -39,6 +40,8 @@ from pneumo_ros.errors import InputError
 Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a structure
 # (model, fit logs, held-out log, a structure or None, threads) -> of what the nominal model leaves, and of what it does
 Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]
+# (model, fit logs, held-out log) -> what a structure leaves in the equations along the held-out one
+HoldEquations = Callable[[Any, Sequence[Any], Any], Equations]
 LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
 SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]
 # Share of the library that the excitation cannot show, above which "none" would say nothing [taste]
@@ -58,6 +61,7 @@ class Options:
     limits : what counts as evidence
     calibration : constants of the probabilities
     locate : places of what structures leave, see :data:`Locate`
+    equations : what structures leave in the rig's equations, see :data:`HoldEquations`
     experiment : design the experiment that splits an ambiguity group
     threads : simulations at a time
     """
@@ -67,6 +71,7 @@ class Options:
     limits: Thresholds = field(default_factory=null_thresholds)
     calibration: Calibration = field(default_factory=Calibration)
     locate: Locate | None = None
+    equations: HoldEquations | None = None
     experiment: Callable[[Problem, Fit, Fit], NextExperiment | None] | None = None
     threads: int = 1
 
@@ -145,7 +150,8 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
     tell(0.94, "what else could be closed")
     rest = after if after is not None else before
     likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
-    beside = closable(problem, best, holdout, floor, runs["refit"].total, likely)
+    held = None if options.equations is None else options.equations(problem.model, problem.records, holdout)
+    beside = closable(problem, best, holdout, floor, runs["refit"].total, likely, held)
     return replace(found, closable=beside, before=before, after=after)
 
 
@@ -239,7 +245,8 @@ def _final(problem: Problem, one: Fit, rows: Mask) -> Fit:
 def _on_held_out(outcome: Outcome) -> HeldOutGaps:
     floor, runs = total_floor(outcome.holdout), outcome.runs
     form = stated_form(outcome.holdout)
-    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, form / floor)
+    kept = 0.0 if outcome.after is None or outcome.after.kept is None else outcome.after.kept
+    return HeldOutGaps(runs["refit"].total / floor, runs["best"].total / floor, form / floor, kept)
 
 
 def _gap(model: Model, holdout: Record, runs: Mapping[str, HeldOut]) -> Gap:
@@ -289,6 +296,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
     out |= {f"closes:{effect.family}": effect.closes for effect in outcome.closable.effects}
     out |= {f"at_bounds:{effect.family}": effect.at_bounds for effect in outcome.closable.effects}
     out |= {f"instead:{one.family}": one.instead for one in outcome.closable.effects if one.instead < 1.0}
+    out |= {f"unheld:{effect.family}": effect.unheld for effect in outcome.closable.effects}
     out |= {f"follows:{one.family}": one.follows for one in outcome.closable.effects if np.isfinite(one.follows)}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 

@@ -14,7 +14,8 @@ from pneumo_ros.diagnosis.diagnose import Fitted, Options, diagnose, split_by_ti
 from pneumo_ros.diagnosis.fit.together import each
 from pneumo_ros.diagnosis.half_car.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.half_car.signals.wiring import check_wiring
-from pneumo_ros.diagnosis.half_car.where import Location, Start, flexible_gain, locate
+from pneumo_ros.diagnosis.half_car.where import Location, Start, flexible_gain, held_equations, locate
+from pneumo_ros.diagnosis.judge.equations import Equations
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
@@ -40,6 +41,8 @@ class Task:
         chosen = options or Options()
         if chosen.locate is None:
             chosen = replace(chosen, locate=flexible_search)
+        if chosen.equations is None:
+            chosen = replace(chosen, equations=left_in_equations)
         found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
         return replace(found, notes=(*self.notes, *found.notes))
 
@@ -155,6 +158,11 @@ def diagnose_files(
     """Diagnose logs; parameters as in :func:`prepared`."""
     threads = 1 if options is None else options.threads
     return prepared(fit, holdout, rig, edit, effects, without, threads).diagnose(options, progress)
+
+
+def left_in_equations(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Equations:
+    """What structures leave in the held-out log's equations: :data:`pneumo_ros.diagnosis.diagnose.HoldEquations`."""
+    return held_equations(model, fit, holdout).left
 
 
 def flexible_search(

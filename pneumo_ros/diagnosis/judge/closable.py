@@ -8,7 +8,7 @@ is left, and can be closed by no family of the structure, is the remainder.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,6 +18,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
+from pneumo_ros.diagnosis.judge.equations import Equations, kept
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
@@ -60,6 +61,8 @@ class EffectEvidence:
         no such place is known
     follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
         follows, over the least that this kind of error leaves; infinite where nothing is asked
+    unheld : share of what the equations along the held-out log miss without the effect that they miss with it as well
+        (:func:`pneumo_ros.diagnosis.judge.equations.kept`); 0 where nobody looked
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -76,6 +79,7 @@ class EffectEvidence:
     beside: float = 1.0
     instead: float = 1.0
     follows: float = np.inf
+    unheld: float = 0.0
 
     @property
     def family(self) -> str:
@@ -119,7 +123,13 @@ class Closable:
 
 
 def closable(
-    problem: Problem, best: Fit, holdout: Record, floor: float, refit: float, places: Sequence[str]
+    problem: Problem,
+    best: Fit,
+    holdout: Record,
+    floor: float,
+    refit: float,
+    places: Sequence[str],
+    equations: Equations | None = None,
 ) -> Closable:
     """Judge the best structure's effects against what is closable at their places and elsewhere.
 
@@ -130,6 +140,8 @@ def closable(
     floor : gap that sensors and the model's stated form leave, as the contract's gap
     refit : held-out gap of the refit, as the contract's
     places : further places of the contract where something may be missing, the likeliest first
+    equations : what a structure leaves in the rig's equations along the held-out log, see
+        :data:`pneumo_ros.diagnosis.judge.equations.Equations`
     """
     left = held_by(problem, best, holdout).total
     own = _above(left, floor)
@@ -141,18 +153,21 @@ def closable(
     added = problem.each(lambda where: _anything(problem, best, holdout, floor, where, left), wheres)
     remainders = dict(zip(wheres, added, strict=True))
     much = own > LEFT**2 * _above(refit, floor)
-    elsewhere = [(law, places) for law in best.candidate.laws for places in _elsewhere(problem, law, much)]
+    elsewhere = exchanges({law: _elsewhere(problem, law, much) for law in best.candidate.laws})
     instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
+
+    moved = 0.0 if equations is None else _left_in(equations, problem, best)
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
         without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
+        unheld = 0.0 if equations is None else kept(moved, _left_in(equations, problem, bare))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
-            follows=_followed(problem, holdout, missed.predicted, law, at[law]),
+            follows=_followed(problem, holdout, missed.predicted, law, at[law]), unheld=unheld,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
 
@@ -205,6 +220,12 @@ def _beside(
     return replace(one, beside=beside, instead=float(np.sqrt(left / max(one.own, 1e-12))))
 
 
+def _left_in(equations: Equations, problem: Problem, one: Fit) -> float:
+    """Mean square that a structure leaves in the equations, null variances."""
+    active = problem.active(one.candidate, problem.values(one.candidate, one.x))
+    return equations(problem.nuisance(one.x), tuple(active))
+
+
 def _above(gap: float, floor: float) -> float:
     """Mean square of a gap above a floor."""
     return max(gap**2 - floor**2, 0.0)
@@ -233,12 +254,25 @@ def _elsewhere(problem: Problem, law: Part, much: bool) -> tuple[tuple[str, ...]
     return effect.elsewhere_of(law[1])
 
 
+def exchanges(
+    elsewhere: Mapping[Part, Sequence[tuple[str, ...]]],
+) -> list[tuple[tuple[Part, ...], tuple[str, ...]]]:
+    """Effects that may be exchanged for what acts at some places: each alone, and all that the same places may stand
+    for together, because one unknown thing is often split between two names.
+    """
+    alone = [((law,), where) for law, wheres in elsewhere.items() for where in wheres]
+    places = dict.fromkeys(where for _, where in alone)
+    together = [(tuple(law for law, wheres in elsewhere.items() if where in wheres), where) for where in places]
+    return [*alone, *(it for it in together if len(it[0]) > 1)]
+
+
 def _instead(
-    problem: Problem, best: Fit, holdout: Record, floor: float, law: Part, where: tuple[str, ...]
+    problem: Problem, best: Fit, holdout: Record, floor: float, laws: Sequence[Part], where: tuple[str, ...]
 ) -> Remainder:
-    """The structure with whatever may act at some places in place of one of its effects."""
+    """The structure with whatever may act at some places in place of some of its effects."""
     parts = _whatever(problem, where)
-    bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
+    gone = [part for law in laws for part in of_law(best.candidate, law)]
+    bare = _fitted(problem, reduced(problem, best, gone, STEPS, _all(problem)))
     found = with_parts(problem, bare, parts, INSTEAD, _all(problem)) if parts else bare
     total = held_by(problem, found, holdout).total
     return Remainder(where, parts, found, _above(total, floor), total)

@@ -44,6 +44,11 @@ class Calibration:
         lies: a wrong name does the work of what is missing, and nobody misses it once that is there
     instead : how many times as much (rms) as the structure whatever may act there must leave in the effect's place for
         that to say nothing: what explains less is no rival
+    kept : share of what the refit leaves in the rig's own equations along the held-out log, mean square above noise,
+        that the structure must leave to be as likely something else: it moves the run by forces and flows that the rig
+        does not have
+    unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
+        likely something else
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
@@ -70,6 +75,8 @@ class Calibration:
     slight: float = 0.12
     beside: float = 0.2
     instead: float = 2.0
+    kept: float = 0.7
+    unheld: tuple[float, float] = (0.8, 0.95)
     traces: float = 0.4
     held_real: float = 3.0
     right: float = 0.93
@@ -87,11 +94,14 @@ class HeldOutGaps:
     refit, chosen : free-run gaps of the refit and of the chosen structure over the floor that sensors and the stated
         model form leave
     form : what the maker holds the model form to be worth, over the same floor; 0 where nothing is stated
+    kept : share of what the refit leaves in the rig's equations that the chosen structure leaves as well, mean square
+        above noise; 0 where nobody looked
     """
 
     refit: float
     chosen: float
     form: float = 0.0
+    kept: float = 0.0
 
     @property
     def within_form(self) -> bool:
@@ -195,7 +205,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
                c.slight / max(closed, 1e-9),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
-               c.traces / max(beyond(held.refit, 1.0), 1e-9)]  # fmt: skip
+               c.traces / max(beyond(held.refit, 1.0), 1e-9), held.kept / c.kept,
+               max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0])]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it.
     if one.places[0].startswith(SENSOR):
         against += [one.own / max(one.without - one.own, 1e-12), 1.0 / max(one.follows, 1e-9)]

@@ -292,6 +292,11 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
             replace(SURE, places=("sensor:sprung_front",), own=k / (1.0 + k), ceiling=k / (1.0 + k)),
             FAR,
         ),
+        "the equations miss what they did": (SURE, replace(FAR, kept=k * c.kept)),
+        "they miss nothing without it": (
+            replace(SURE, unheld=c.unheld[0] + k * (c.unheld[1] - c.unheld[0])),
+            FAR,
+        ),
         "a reading that stops": (replace(SURE, places=("sensor:front_pressure",), follows=1.0 / k), FAR),
     }
 

@@ -14,9 +14,8 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.diagnosis.half_car.where.locate import Location, corrected_residual
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, kept
 
-# Mean square, null standard deviations, that noise, tolerances and model form leave anyway [definition]
-EXPLAINED: Final = 1.0
 SPAN: Final = 1.0  # s of a block whose mean squares are taken as independent [taste]
 
 
@@ -50,10 +49,9 @@ class FlexibleGain:
     def kept(self) -> float:
         """Share of what the re-estimated nominal structure leaves, above noise and form, that this one leaves as well.
 
-        Near zero for the right kind of law; near one, or far above where it puts forces that the rig does not have, for
-        a wrong one. A gap that the equations hardly show counts as one null variance.
+        See :func:`pneumo_ros.diagnosis.judge.equations.kept`.
         """
-        return max(self.left - EXPLAINED, 0.0) / max(self.before - EXPLAINED, EXPLAINED)
+        return kept(self.left, self.before)
 
 
 def flexible_gain(nominal: Location, found: Location) -> FlexibleGain:
