@@ -18,7 +18,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
-from pneumo_ros.diagnosis.judge.equations import Equations, kept
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
@@ -61,8 +61,8 @@ class EffectEvidence:
         no such place is known
     follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
         follows, over the least that this kind of error leaves; infinite where nothing is asked
-    unheld : share of what the equations along the held-out log miss without the effect that they miss with it as well
-        (:func:`pneumo_ros.diagnosis.judge.equations.kept`); 0 where nobody looked
+    missing : what the structure leaves in the equations along the held-out log, and what is left there without the
+        effect, mean squares in null variances; None where nobody looked
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -79,7 +79,7 @@ class EffectEvidence:
     beside: float = 1.0
     instead: float = 1.0
     follows: float = np.inf
-    unheld: float = 0.0
+    missing: tuple[float, float] | None = None
 
     @property
     def family(self) -> str:
@@ -91,6 +91,19 @@ class EffectEvidence:
         """Share, rms, of what can be closed at its places that its family closes; 0..1."""
         whole = np.sqrt(self.without) - np.sqrt(min(self.ceiling, self.own))
         return float(np.clip((np.sqrt(self.without) - np.sqrt(self.own)) / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
+
+    @property
+    def unheld(self) -> float:
+        """Share of what the equations miss without the effect that they miss with it as well; 0 where nobody looked."""
+        return 0.0 if self.missing is None else kept(*self.missing)
+
+    @property
+    def held_up(self) -> float:
+        """How much more the equations miss without the effect, over what they miss with it; 0 where nobody looked."""
+        if self.missing is None:
+            return 0.0
+        own = max(self.missing[0], EXPLAINED)
+        return max(self.missing[1] - own, 0.0) / own
 
 
 @dataclass(frozen=True)
@@ -163,11 +176,11 @@ def closable(
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
         without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
-        unheld = 0.0 if equations is None else kept(moved, _left_in(equations, problem, bare))
+        missing = None if equations is None else (moved, _left_in(equations, problem, bare))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
-            follows=_followed(problem, holdout, missed.predicted, law, at[law]), unheld=unheld,
+            follows=_followed(problem, holdout, missed.predicted, law, at[law]), missing=missing,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
 

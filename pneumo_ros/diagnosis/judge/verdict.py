@@ -39,7 +39,8 @@ class Calibration:
     real : what the refit leaves of the kept blocks, sigma squared, above which a gap without a name counts as unknown
         rather than none
     least : share of what the refit leaves at which an effect is as likely to be the misfit of another
-    slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that
+    slight : share (rms, above the floor) of what the refit leaves that the whole structure must close at that, unless
+        the equations miss twice as much without the effect: beside something larger that nobody can predict
     beside : share of what an effect holds that it must still hold beside whatever may act where the rest of the gap
         lies: a wrong name does the work of what is missing, and nobody misses it once that is there
     instead : how many times as much (rms) as the structure whatever may act there must leave in the effect's place for
@@ -203,7 +204,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
-               c.slight / max(closed, 1e-9),
+               min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9), held.kept / c.kept,
                max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0])]  # fmt: skip

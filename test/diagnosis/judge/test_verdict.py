@@ -294,7 +294,7 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
         ),
         "the equations miss what they did": (SURE, replace(FAR, kept=k * c.kept)),
         "they miss nothing without it": (
-            replace(SURE, unheld=c.unheld[0] + k * (c.unheld[1] - c.unheld[0])),
+            replace(SURE, missing=(1.0 + 1e6 * (c.unheld[0] + k * (c.unheld[1] - c.unheld[0])), 1.0 + 1e6)),
             FAR,
         ),
         "a reading that stops": (replace(SURE, places=("sensor:front_pressure",), follows=1.0 / k), FAR),
@@ -308,6 +308,13 @@ def test_each_reason_against_a_name_alone(reason: str) -> None:
     for k in (0.5, 0.8, 1.0):
         one, held = reasons(k)[reason]
         assert credit(one, held, CONSTANTS) == pytest.approx(1.0 / (1.0 + k**CONSTANTS.steepness), abs=2e-4)
+
+
+@pytest.mark.parametrize("without, named", [(13.0, True), (5.5, False), (4.1, False)])
+def test_what_the_equations_miss_is_named_beside_what_nobody_can_predict(without: float, named: bool) -> None:
+    """It closes 6 % of the run's gap; the equations miss 4 null variances with it and so many without."""
+    one = replace(SURE, missing=(4.0, without))
+    assert (credit(one, HeldOutGaps(100.0, 94.0), CONSTANTS) > 0.5) is named
 
 
 def test_what_no_name_explains_is_unknown_from_its_constants_on() -> None:
