@@ -23,8 +23,8 @@ from pneumo_ros.diagnosis.search.selection import (
     SAME,
     Scored,
     Thresholds,
-    advantage,
     by_families,
+    gained,
     likeliest,
     log_weight,
     score,
@@ -181,7 +181,7 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
             break
         without = reduced(problem, found, of_law(found.candidate, law))
         more, less = score(problem, found), score(problem, without)
-        if advantage(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
+        if gained(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
             found = without
     if found is not best.fit:
         search.structures.append(found)

@@ -39,6 +39,7 @@ LAW_SHARE: Final = 0.01  # of the refit's root mean square: what right laws leav
 SHARPNESS: Final = 36.0
 # Of what nulls win: the highest that 160 rigs tell within 20 % (test_null_table.py) [definition]
 NULL_QUANTILE: Final = 0.95
+THIRD: Final = 3  # effects from which on the fitted samples count as the kept ones do [taste]
 # Log weight that each unknown used costs: what could fit anything proves less [calibration: set 0.4, opened]
 PER_UNKNOWN: Final = 1.0
 
@@ -217,6 +218,20 @@ def advantage(poorer: Scored, richer: Scored) -> float:
     return float(np.log((FORM + poorer.level) / (FORM + richer.level)))
 
 
+def gained(poorer: Scored, richer: Scored) -> float:
+    """Fall of log mean square that a further effect brings, against a threshold for :func:`advantage`.
+
+    For a second effect that of the kept blocks alone: the misfit of a first one's law is all that it might serve. For
+    those after it the mean of fitted and kept samples, as :func:`log_weight` counts them, and at most twice that of the
+    kept ones: where several laws leave their misfits, some blocks hardly show one effect more.
+    """
+    kept = advantage(poorer, richer)
+    if richer.size < THIRD:
+        return kept
+    fitted = float(np.log((FORM + poorer.fitted) / (FORM + richer.fitted)))
+    return min(0.5 * (kept + fitted), 2.0 * kept)
+
+
 def standard_error(one: Scored, other: Scored) -> float:
     """Of the difference of their levels over the blocks."""
     difference = one.blocks - other.blocks
@@ -239,7 +254,7 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
         poorer = chosen
         fallen = poorer.level - best.level
         paid = poorer.fit.cost - best.fit.cost
-        shown = advantage(poorer, best) > gain and fallen > limits.least and paid > cost
+        shown = gained(poorer, best) > gain and fallen > limits.least and paid > cost
         if size == 1:
             # A stop that is hit once lies in one block: where the kept blocks say nothing, the fit must say it by far.
             evidence = shown or (paid > limits.alone * cost and fallen > -SAME * poorer.level)

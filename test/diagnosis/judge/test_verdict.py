@@ -216,6 +216,22 @@ def test_where_the_kept_blocks_say_nothing_the_fit_must_say_it_by_far() -> None:
     assert opinion(refit, scored(0.25, -900.0, "bump_stop", unknowns=34)).verdict == "none"  # it spoils the others
 
 
+@pytest.mark.parametrize("kept, fitted, taken", [(0.2, 0.5, True), (0.2, 0.3, False), (0.1, 0.9, False)])
+def test_a_third_effect_is_shown_by_fitted_and_kept_samples_and_a_second_by_the_kept(
+    kept: float, fitted: float, taken: bool
+) -> None:
+    refit = scored(4000.0, 9000.0)
+    one, two = scored(600.0, 5000.0, "leak"), scored(100.0, 3000.0, "leak", "cg_shift")
+
+    def richer(than: Scored, *names: str) -> Scored:
+        falls = {"level": than.level * np.exp(-kept), "fitted": than.fitted * np.exp(-fitted)}
+        return replace(scored(1.0, than.fit.cost - 500.0, *names), **falls)
+
+    three = richer(two, "leak", "cg_shift", "payload")
+    assert select(refit, [one, two, three], LIMITS).size == (3 if taken else 2)
+    assert select(refit, [one, richer(one, "leak", "cg_shift")], LIMITS).size == 1
+
+
 def test_the_group_holds_what_is_not_excluded() -> None:
     """Beside none and unknown as well; the verdict itself first, the likeliest next."""
     chosen = scored(0.2, -900.0)
