@@ -249,7 +249,9 @@ def _law(law: Law) -> dict[str, str]:
 def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     if not summary.get("ranking"):
         return []
-    return [quantity_cells(name, value) for name, value in winner(summary)["parameters"].items()]
+    found = winner(summary)["parameters"].items()
+    # A part of a shape that is absent stands at nothing, with nothing to vary.
+    return [quantity_cells(name, q) for name, q in found if (q["value"], q.get("std", 0.0)) != (0.0, 0.0)]
 
 
 # sentence above the rivals of a verdict [display]
