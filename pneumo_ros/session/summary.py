@@ -244,6 +244,7 @@ def counts_missed(summary: Summary) -> bool:
 
 
 OUT_OF_RANGE = "out of its range"
+NOTHING = 1e-9  # of any figure, in its unit: a rig at trim on a flat road moves by what rounding does
 LARGE = 3.0  # ratio from which a factor says more than per cent
 
 
@@ -254,7 +255,7 @@ def figures(values: Sequence[float], form: str) -> str:
 
 def change(ours: Sequence[float], theirs: Sequence[float]) -> str:
     """Per cent from theirs to ours, or the factor where it is large; nothing where there is none."""
-    return " / ".join(_change(a, b) for a, b in zip(ours, theirs, strict=False) if b and np.isfinite(a / b))
+    return " / ".join(_change(a, b) for a, b in zip(ours, theirs, strict=False) if abs(b) > NOTHING and np.isfinite(a))
 
 
 def _change(ours: float, theirs: float) -> str:

@@ -127,6 +127,7 @@ def test_a_rating_that_left_its_scale_is_no_zero(simulated: Recorded) -> None:
 
 def test_a_large_change_is_a_factor() -> None:
     assert change([55.97], [1.0]) == "x 56" and change([0.5, 1.2], [1.0, 1.0]) == "-50 % / +20 %"
+    assert change([0.36, 1.0], [1e-15, 2e-15]) == ""  # a flat road: nothing moves by itself
     assert figures([float("nan")], "%.2f") == "out of its range"
 
 

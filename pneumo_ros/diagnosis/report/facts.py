@@ -143,6 +143,8 @@ def rivals(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> str
         words = effect_name(name).replace("+", " and ")
         words += f" ({percent(float(entry['probability']))})" if entry and float(entry["probability"]) >= 0.005 else ""
         differs = next((_difference(library, one, name) for one in own if _difference(library, one, name)), "")
+        guide = library[name].guide if name in library else None
+        differs = differs or ("" if guide is None else guide.meaning.rstrip("."))  # what it is, where nobody compared
         out.append(f"{words}: {differs}" if differs else words)
     return "; ".join(out)
 
