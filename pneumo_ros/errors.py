@@ -12,6 +12,14 @@ class PneumoError(Exception):
     """Base of every error this package raises on purpose; the command line turns it into exit code 2."""
 
 
+def is_interruption(error: BaseException) -> bool:
+    """Whether it is Ctrl-C, also one that met compiled code, which hands it on as the cause of a SystemError."""
+    found: BaseException | None = error
+    while found is not None and not isinstance(found, KeyboardInterrupt):
+        found = found.__cause__
+    return found is not None
+
+
 class InputError(PneumoError):
     """A file, key or value that cannot be used.
 

@@ -10,7 +10,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from typing import TypeVar
 
-from pneumo_ros.errors import InputError
+from pneumo_ros.errors import InputError, is_interruption
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -61,6 +61,8 @@ def _attempt(work: Callable[[Item], object], item: Item) -> str:
     try:
         work(item)
     except Exception as error:  # one bad case must not end the batch; it is reported and can be run again
+        if is_interruption(error):
+            raise KeyboardInterrupt from error
         return f"{type(error).__name__}: {error}"
     return ""
 

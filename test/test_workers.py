@@ -35,6 +35,21 @@ def fail(folder: str) -> None:
     raise ValueError(folder)
 
 
+def ctrl_c_in_compiled_code(folder: str) -> None:
+    """What numba makes of a handler's exception."""
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as error:
+        raise SystemError("CPUDispatcher returned a result with an exception set") from error
+
+
+def test_ctrl_c_ends_a_batch_whatever_code_it_meets(tmp_path: Path) -> None:
+    """It was a case that failed, and the batch went on."""
+    with pytest.raises(KeyboardInterrupt):
+        list(run_each(ctrl_c_in_compiled_code, [str(tmp_path)]))
+    assert "ValueError" in next(iter(run_each(fail, [str(tmp_path)])))[1]
+
+
 def test_a_killed_local_worker_costs_a_restart_only(tmp_path: Path) -> None:
     outcomes = dict(run_each(die_once, [str(tmp_path)], workers=2))
     assert outcomes == {str(tmp_path): ""}

@@ -143,13 +143,18 @@ def diagnose(
 
 
 def _bench(log: Path) -> tuple[str, ...]:
-    """Options of `pneumo run` that reach the bench a log is of; none for a simulated session or another recorder's."""
+    """Options of `pneumo run` that reach the rig a log is of, simulated or not; none for another recorder's."""
     from pneumo_ros.log.inspection import final_parameters
     from pneumo_ros.log.reading import read_log
 
-    daq = final_parameters(read_log(log)).get("daq", {})
+    nodes = final_parameters(read_log(log))
+    daq, hidden = nodes.get("daq", {}), str(nodes.get("plant", {}).get("simulated_rig", ""))
     given = [(f"--{key}", str(daq[key])) for key in ("port", "calibration") if daq.get(key)]
-    return ("--source", "serial", *(word for pair in given for word in pair)) if daq else ()
+    if daq:
+        return ("--source", "serial", *(word for pair in given for word in pair))
+    if hidden:
+        return ("--set", f"plant.simulated_rig={hidden}")
+    return ("--source", "sim") if "plant" in nodes else ()
 
 
 def _repeated(rig: Path | None, effects: Sequence[Path] | None, without: Sequence[str] | None) -> tuple[str, ...]:

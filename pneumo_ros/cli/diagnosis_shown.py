@@ -28,7 +28,7 @@ def show(console: Console, found: Diagnosis, first: Story) -> None:
     if first.facts:
         console.print(fact_table(first.facts))
     if found.verdict != "not_testable":
-        _show_budget(console, summary)
+        show_budget(console, summary, found.verdict)
         _show_ranking(console, summary)
     if found.edit is not None:
         _show_edit(console, found.edit)
@@ -40,18 +40,22 @@ def show(console: Console, found: Diagnosis, first: Story) -> None:
             console.print(f"  {line}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _show_budget(console: Console, summary: Mapping[str, object]) -> None:
+def show_budget(console: Console, summary: Mapping[str, object], verdict: str) -> None:
+    """What makes the gap, a row each; where no name is accepted, that these are only the closest ones."""
     from pneumo_ros.cli.tables import simple_table
     from pneumo_ros.diagnosis.report.budget import budget_rows
     from pneumo_ros.diagnosis.result import DIFFERS
 
+    nobody = verdict == "unknown" and bool(summary.get("budget"))
     rows = []
     for row in budget_rows(summary):
         entry = row.get("entry", {})
-        probability = f"{entry['probability']:.2f}" if entry else ""
         law = {"": "", DIFFERS: "another"}.get(str(entry.get("law", "")), "the library's")
-        rows.append((row["words"], f"{100 * row['share']:.1f} %", law, probability))
-    console.print(simple_table(("what makes the nominal model's gap", "share", "law", "probability"), rows))
+        # Where no name is accepted, how probable each is stands below, in what competed.
+        probable = () if nobody else (f"{entry['probability']:.2f}" if entry else "",)
+        rows.append((row["words"], f"{100 * row['share']:.1f} %", law, *probable))
+    head = "the closest names, none accepted" if nobody else "what makes the nominal model's gap"
+    console.print(simple_table((head, "share", "law", *(() if nobody else ("probability",))), rows))
 
 
 def _show_ranking(console: Console, summary: Mapping[str, Any]) -> None:

@@ -20,7 +20,7 @@ from pneumo_ros.cli.terminal import Console
 
 if TYPE_CHECKING:
     from pneumo_ros.log.comparison import Comparison
-    from pneumo_ros.log.inspection import Report, Timing, TopicReport
+    from pneumo_ros.log.inspection import Report, TopicReport
     from pneumo_ros.log.repair import Recovery
     from pneumo_ros.log.salvage import Salvaged
 
@@ -199,7 +199,7 @@ def _show_report(report: Report) -> None:
         console.print(f"no messages on: {empty}", highlight=False)
     for topic in report.topics:
         if topic.timing is not None and topic.timing.gaps:
-            console.print(f"[yellow]{topic.name}[/]: {_gaps_in_words(topic.timing)}", highlight=False)
+            console.print(f"[yellow]{topic.name}[/]: {topic.timing.gaps_in_words}", highlight=False)
     if report.missing_topics:
         console.print(f"[red]missing topics[/] {', '.join(report.missing_topics)}")
     if report.unprotected:
@@ -210,10 +210,6 @@ def _show_report(report: Report) -> None:
 def _seconds(time_ns: int, start: int) -> str:
     """Since the first sample; what was noted before it was there from the start."""
     return f"{max(time_ns - start, 0) * 1e-9:.3f}"
-
-
-def _gaps_in_words(timing: Timing) -> str:
-    return f"{timing.missing} samples missing in {len(timing.gaps)} gaps, the longest {timing.gaps[0].length:.4g} s"
 
 
 def _topics_table(found: Sequence[TopicReport]) -> Table:

@@ -17,7 +17,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def _stopped(number: int = signal.SIGINT, frame: FrameType | None = None) -> None:
-    os.write(2, b"stopped by the user\n")
+    started = sys.modules.get("multiprocessing.process")
+    if started is None or started.parent_process() is None:  # of a batch's processes only the first one says it
+        os.write(2, b"stopped by the user\n")
     os._exit(INTERRUPTED)
 
 
@@ -33,7 +35,7 @@ from typer.core import TyperCommand, TyperGroup
 from pneumo_ros import __version__
 from pneumo_ros.cli.app import App
 from pneumo_ros.cli.interruption import interrupt
-from pneumo_ros.errors import PneumoError, not_one_of
+from pneumo_ros.errors import PneumoError, is_interruption, not_one_of
 
 BAD_INPUT = 2
 VERBS: dict[str, str] = {
@@ -94,7 +96,9 @@ class LazyGroup(TyperGroup):
         """Run the verb; Ctrl-C that it leaves to us is one line."""
         try:
             return super().invoke(ctx)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemError) as error:
+            if not is_interruption(error):
+                raise
             print("stopped by the user", file=sys.stderr)
             raise typer.Exit(INTERRUPTED) from None
 

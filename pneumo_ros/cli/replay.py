@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 app = App(add_completion=False)
 console = Console()
 DIFFERS = 1
+SHOWN = {"m": ("mm", 1e3), "Pa": ("kPa", 1e-3)}  # unit -> unit that people read, and factor to it
 
 
 @dataclass(frozen=True)
@@ -235,7 +236,7 @@ def _closed_loop(log: Log, given: Given, diagnosis: Path | None, plot: Path | No
 
     result = _again(log, given) if diagnosis is None else _diagnosed(log, given, diagnosis)
     for note in result.notes:
-        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+        console.print(f"[cyan]note[/] {note}", highlight=False)
     console.print(rerun_table(result))
     if plot is not None:
         draw_rerun(result, plot, f"{log.path.name}: its road through the rig's model in closed loop")
@@ -254,7 +255,7 @@ def _open_loop(log: Log, path: Path | None, plot: Path | None) -> None:
     tell_assumed(console, rig, path)
     result = open_loop(log, rig, stepped_rig if rig.diagnosed else plain_rig)
     for note in result.notes:
-        console.print(f"[cyan]note[/] {note}", highlight=False, soft_wrap=True)
+        console.print(f"[cyan]note[/] {note}", highlight=False)
     console.print(rerun_table(result, "open loop"))
     if plot is not None:
         draw_rerun(result, plot, f"{log.path.name}: its road and openings through {rig.name}", "open loop, model")
@@ -302,12 +303,14 @@ def _diagnosed(log: Log, given: Given, path: Path) -> Rerun:
 
 
 def rerun_table(result: Rerun, how: str = "closed loop") -> Table:
-    """Each measured channel: as recorded, as the model gives it."""
+    """Each measured channel: as recorded, as the model gives it, in mm and kPa."""
     from pneumo_ros.session.rerun import compare_channels
 
-    table = Table("channel", "unit", "std, recorded", f"std, {how}", "rms difference / std", box=box.SIMPLE_HEAD)
+    table = Table("channel", "unit", "std, recorded", f"std, {how}", "off by, of std", box=box.SIMPLE_HEAD)
     for name, unit, recorded, ours, gap in compare_channels(result):
-        table.add_row(name, unit, f"{recorded:.4g}", f"{ours:.4g}", f"{gap:.3f}")
+        shown, factor = SHOWN.get(unit, (unit, 1.0))
+        table.add_row(name, shown, f"{factor * recorded:.4g}", f"{factor * ours:.4g}", f"{gap:.3f}")
+    table.caption, table.caption_justify = "off by: rms difference over the recorded std", "left"
     return table
 
 

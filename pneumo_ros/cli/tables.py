@@ -10,7 +10,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from pneumo_ros.session.summary import change, figures, pace, ride_rows
+from pneumo_ros.session.summary import STEPS_NOTE, change, counts_missed, figures, pace, ride_rows
+from pneumo_ros.session.warnings import MISSED
 from pneumo_ros.units import SQUARE_INCH
 
 if TYPE_CHECKING:
@@ -50,13 +51,14 @@ def summary_table(active: Summary, passive: Summary | None) -> Table:
 def timing_table(summary: Summary) -> Table:
     """Period and execution time of each node's loop, ms, from its last /diagnostics."""
     table = Table(title=f"Loop timing{pace(summary)}; ms: p50, p99, max", title_justify="left", box=box.SIMPLE)
-    waits = summary.mode == "lockstep"
-    for column in ("node", "steps", "period", "", "", "step", "", "", *(() if waits else ("missed",))):
+    misses = counts_missed(summary)
+    for column in ("node", "steps", "period", "", "", "step", "", "", *(("missed",) if misses else ())):
         table.add_column(column, justify="left" if column == "node" else "right", no_wrap=True)
     for node, values in summary.loop.items():
         if values.get("steps", "0") != "0":
             cells = [_milliseconds(values, f"{label} {p} (us)") for label in ("period", "step") for p in PERCENTILES]
-            table.add_row(node, values["steps"], *cells, *(() if waits else (values.get("missed periods", ""),)))
+            table.add_row(node, values["steps"], *cells, *((values.get(MISSED, ""),) if misses else ()))
+    table.caption, table.caption_justify = STEPS_NOTE, "left"
     return table
 
 

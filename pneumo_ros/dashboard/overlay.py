@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -14,6 +17,7 @@ from bokeh.models import (
     ColumnDataSource,
     CrosshairTool,
     CustomJS,
+    Div,
     HoverTool,
     InlineStyleSheet,
     Range1d,
@@ -31,6 +35,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import align, start_of
 from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.topics import DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE
+from pneumo_ros.printable import one_line
 
 CHANNELS = (*DISPLACEMENT.names, "front_pressure", "rear_pressure")
 PAIR = ("#1f77b4", "#d62728")
@@ -38,6 +43,11 @@ POINTS = 4000  # a curve
 SEGMENT = 1024  # samples of a spectrum's windows
 HEIGHT = 240  # px
 BENEATH = 3.0  # px; the first run shows on both sides of one that follows it
+LINE = 1.2  # px
+MEANING: Mapping[str, str] = MappingProxyType({
+    "measured": "the held-out log", "nominal": "the model as its rig file has it",
+    "refit": "parameters re-estimated inside their tolerances", "corrected": "with the best explanation added",
+})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -103,38 +113,37 @@ class Overlay:
         # What is left is near zero: on the axes of the signals it would flatten them.
         self._series = [one for one in series if one.name != RESIDUAL]
         furnish(document, title)
-        tabs = [("over time", self._over_time(self._series)), ("spectrum", self._spectra()), ("XY", self._xy())]
+        over_time = self._over_time(self._series, BENEATH)
+        tabs = [("over time", over_time), ("spectrum", self._spectra()), ("XY", self._xy())]
         left = remainders(self._series)
         if left:
-            tabs.insert(1, ("residual", self._over_time(left)))
+            tabs.insert(1, ("residual", self._over_time(left, LINE, f", {self._series[0].name}")))
+        document.add_root(Div(text=_heading(title, self._series), name="status", sizing_mode="stretch_width"))
         document.add_root(
             Tabs(tabs=[TabPanel(child=child, title=name) for name, child in tabs], sizing_mode="stretch_width")
         )
 
     def _figure(self, channel: str, **options: Any) -> Any:
+        # Above, its tools stand in one row and none is hidden, also on a plot that is not high.
         plot = figure(height=HEIGHT, title=channel.replace("_", " "), sizing_mode="stretch_width",
-                      tools="pan,box_zoom,wheel_zoom,reset,save", **options)  # fmt: skip
+                      tools="pan,box_zoom,wheel_zoom,reset,save", toolbar_location="above", **options)  # fmt: skip
+        plot.toolbar.logo = None
         plot.add_tools(CrosshairTool(), HoverTool(tooltips=[("", "$name"), ("x", "$x{0.0000}"), ("y", "$y{0.0000}")]))
         return plot
 
-    def _over_time(self, series: list[Series]) -> Any:
+    def _over_time(self, series: list[Series], first: float, what: str = "") -> Any:
+        """``first`` : width of the first run's lines, px; ``what`` goes behind each channel's name"""
         ends = [(float(one.time[0]), float(one.time[-1])) for one in series]
         shared = Range1d(min(a for a, _ in ends), max(b for _, b in ends))
         plots = []
         for k, channel in enumerate(CHANNELS):
-            plot = self._figure(channel, x_range=shared, x_axis_label="s", y_axis_label=_unit(k))
+            plot = self._figure(f"{channel}{what}", x_range=shared, x_axis_label="s", y_axis_label=_unit(k))
             lines = []
             for one in series:
                 there = np.isfinite(one.values[:, k])
                 t, y = thin(one.time[there], one.values[there, k], POINTS)
-                lines.append(
-                    (
-                        one.name,
-                        plot.line(
-                            t, y, color=one.colour, name=one.name, line_width=BENEATH if one is series[0] else 1.2
-                        ),
-                    )
-                )
+                width = first if one is series[0] else LINE
+                lines.append((one.name, plot.line(t, y, color=one.colour, name=one.name, line_width=width)))
             plots.append(legend_above(plot, lines))
         return column(_chooser(plots), side_by_side(plots), sizing_mode="stretch_width")
 
@@ -144,7 +153,7 @@ class Overlay:
         plots = []
         for k, channel in enumerate(CHANNELS):
             plot = self._figure(channel, x_axis_type="log", y_axis_type="log", x_axis_label="Hz",
-                                y_axis_label=f"{_unit(k)}2/Hz")  # fmt: skip
+                                y_axis_label=f"{_unit(k)}²/Hz")  # fmt: skip
             lines = []
             for one in self._series:
                 rate = 1.0 / float(np.median(np.diff(one.time)))
@@ -176,6 +185,13 @@ class Overlay:
         return column(wrapping(across, up), legend_above(plot, lines), sizing_mode="stretch_width")
 
 
+def _heading(title: str, series: list[Series]) -> str:
+    """Which log it is, and what the runs are."""
+    said = [f"{one.name}: {MEANING[one.name]}" for one in series if one.name in MEANING]
+    words = "; ".join(said) if said else " and ".join(one.name for one in series)
+    return f"<b>{escape(one_line(title))}</b><br>{escape(one_line(words))}"
+
+
 def remainders(series: list[Series]) -> list[Series]:
     """The first run minus each other one, at the first one's times; empty for a run alone."""
     if len(series) < 2:
@@ -185,7 +201,7 @@ def remainders(series: list[Series]) -> list[Series]:
         there = np.column_stack([np.interp(first.time, one.time, column) for column in one.values.T])
         inside = (first.time >= one.time[0]) & (first.time <= one.time[-1])
         left = np.where(inside[:, None], first.values - there, np.nan)
-        out.append(Series(f"{first.name} - {one.name}", one.colour, first.time, left))
+        out.append(Series(f"minus {one.name}", one.colour, first.time, left))
     return out
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from html import escape
@@ -35,7 +36,7 @@ REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
 WINDOW = 10.0  # s shown
 POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
-WIDGET = 290  # px; the longest name of a parameter with its unit fits above its field
+WIDGET = 330  # px; the longest name of a parameter with its unit and range fits above its field
 EVENTS_SHOWN = 200
 ANSWERS_SHOWN = 6
 # Said when the picture is on the screen: what a browser has drawn is a frame and a turn of its loop later.
@@ -158,14 +159,15 @@ class Page:
         self._gains.children = [wrapping(*widgets, sizing_mode="stretch_width")]
 
     def _widget(self, control: Control) -> Any:
-        unit = f" ({control.unit})" if control.unit not in ("", "1") else ""
-        title, name = one_line(f"{control.node}.{control.name}{unit}"), f"set-{control.node}-{control.name}"
+        title, name = _control_words(control), f"set-{control.node}-{control.name}"
         if control.choices:
             widget: Any = Select(
                 title=title, value=str(control.value), options=list(control.choices), name=name, width=WIDGET
             )
         elif isinstance(control.value, bool):
-            widget = Toggle(label=title, active=control.value, name=name, width=WIDGET)
+            widget = Toggle(label=f"{title}: {_on_off(control.value)}", active=control.value, name=name, width=WIDGET)
+            words = CustomJS(args={"title": title}, code="cb_obj.label = title + (cb_obj.active ? ': on' : ': off')")
+            widget.js_on_change("active", words)
         else:
             widget = Spinner(
                 title=title, value=control.value, low=control.low, high=control.high, name=name, width=WIDGET
@@ -255,6 +257,19 @@ class Page:
         if new:
             self._said = [*self._said, *new][-ANSWERS_SHOWN:]
             self._answers.text = "<br>".join(_shown(line) for line in self._said)
+
+
+def _control_words(control: Control) -> str:
+    """Name of a parameter with its unit and the range that its node takes: ``estimator.forgetting (1/s, 0 to 500)``."""
+    unit = "" if control.unit in ("", "1") else control.unit
+    bounded = not isinstance(control.value, str | bool) and math.isfinite(control.low) and math.isfinite(control.high)
+    span = f"{control.low:g} to {control.high:g}" if bounded else ""
+    told = ", ".join(part for part in (unit, span) if part)
+    return one_line(f"{control.node}.{control.name}" + (f" ({told})" if told else ""))
+
+
+def _on_off(value: object) -> str:
+    return "on" if value else "off"
 
 
 def _values(values: Mapping[str, str]) -> str:

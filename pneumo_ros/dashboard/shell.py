@@ -14,6 +14,7 @@ from bokeh.models import InlineStyleSheet, Legend, LegendItem
 from pneumo_ros.printable import one_line
 
 NARROW = 720  # px below which there is one plot in a row
+ROOM = 44  # characters of a legend's line; a telephone cuts off what is longer
 # Without it a telephone draws a page of 980 px and shrinks it.
 _TEMPLATE = """{% extends base %}
 {% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
@@ -42,7 +43,9 @@ def legend_above(plot: Any, lines: Sequence[tuple[str, Any]], size: str = "10px"
     """The plot with its legend between title and curves, where it covers none of them; a click hides a curve."""
     items = [LegendItem(label=name, renderers=[line]) for name, line in lines]
     legend = Legend(items=items, click_policy="hide", label_text_font_size=size, orientation="horizontal", padding=2,
-                    margin=0, location="left", border_line_alpha=0.0)  # fmt: skip
+                    margin=0, location="left", border_line_alpha=0.0, background_fill_alpha=0.0)  # fmt: skip
+    if sum(len(name) for name, _ in lines) > ROOM:
+        legend.ncols = max(1, ROOM // max(len(name) for name, _ in lines))
     plot.add_layout(legend, "above")
     return plot
 

@@ -15,6 +15,7 @@ from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
 from pneumo_ros.diagnosis.fit.shooting import Piece
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
+from pneumo_ros.diagnosis.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
 from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
@@ -221,7 +222,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         gap=_gap(problem.model, holdout, outcome.runs),
         nuisance=nuisance_estimates(problem, best, cov),
         active=outcome.active,
-        budget=shares.entries,
+        budget=with_own_laws(problem, best, shares.entries),
         refit_share=shares.refit,
         remainder=shares.remainder,
         floor_share=shares.floor,

@@ -173,8 +173,7 @@ def _stamps_sound(stamps: NDArray[np.int64], logged: NDArray[np.int64]) -> Itera
     if timing.jumps:
         yield "warning", f"a clock was set {timing.jumps} times (delay changes by more than 0.1 s)"
     if timing.missing:
-        gap = timing.gaps[0]
-        yield "warning", f"{timing.missing} samples missing in {len(timing.gaps)} gaps, the longest {gap.length:.4g} s"
+        yield "warning", timing.gaps_in_words
 
 
 def _together(log: Log) -> Iterator[Finding]:

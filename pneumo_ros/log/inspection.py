@@ -65,6 +65,15 @@ class Timing:
     jumps: int
     disordered: int
 
+    @property
+    def gaps_in_words(self) -> str:
+        """``17 samples missing in 16 gaps, the longest 0.006 s``; '' where none is missing."""
+        if not self.gaps:
+            return ""
+        samples, gaps = (f"{n} {word}" + ("s" if n != 1 else "")
+                         for n, word in ((self.missing, "sample"), (len(self.gaps), "gap")))  # fmt: skip
+        return f"{samples} missing in {gaps}, the longest {self.gaps[0].length:.4g} s"
+
 
 @dataclass(frozen=True)
 class TopicReport:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Topics as tables, one row a message, for pandas and spreadsheets: CSV or Parquet."""
+"""Topics as tables, one row a message, for pandas, MATLAB and spreadsheets: CSV, Parquet or MAT."""
 
 from __future__ import annotations
 
@@ -174,9 +174,16 @@ def _write_mat(path: Path, content: Table) -> None:
     for column in content:
         name = re.sub(r"\W", "_", column.strip("/")).lstrip("_0123456789")[-60:].lstrip("_0123456789") or "x"
         names[column] = name if name not in names.values() else f"{name}_{len(names)}"[-63:]
-    values = {names[c]: _plain(v) if v.dtype == object else v for c, v in content.items()}
+    values = {names[c]: _cells(_plain(v)) if v.dtype == object else v for c, v in content.items()}
     with path.open("wb") as stream:
         savemat(stream, values, oned_as="column", do_compression=True)
+
+
+def _cells(values: list[Any]) -> NDArray[Any]:
+    """A cell array of texts, or numbers; what a message does not have is an empty text, or NaN. MATLAB has no None."""
+    if any(isinstance(value, str) for value in values):
+        return np.array(["" if value is None else str(value) for value in values], dtype=object)
+    return np.array([np.nan if value is None else float(value) for value in values])
 
 
 def _write_csv(path: Path, content: Table) -> None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of a session: road and heave, pitch, tyre forces, orifice areas, effective areas true and estimated."""
+"""One picture of a session: road and heave, pitch, tyre forces, pressures, orifice areas, effective areas true and
+estimated.
+"""
 
 from __future__ import annotations
 
@@ -23,11 +25,12 @@ FRONT, REAR, GREY = "#1f77b4", "#d62728", "#9a9a9a"
 
 def draw_session(session: Recorded, path: Path, passive: Recorded | None = None, title: str = "") -> None:
     """Write a PNG; ``passive`` is drawn in grey behind the active run."""
-    figure, axes = plt.subplots(6, 1, figsize=(11, 14), sharex=True, constrained_layout=True)
+    figure, axes = plt.subplots(7, 1, figsize=(11, 16), sharex=True, constrained_layout=True)
     _motion(axes[0], axes[1], session, passive)
     _tyres(axes[2], session)
-    _orifices(axes[3], session)
-    for side, (axis, name, colour) in enumerate(((axes[4], "front", FRONT), (axes[5], "rear", REAR))):
+    _pressures(axes[3], session)
+    _orifices(axes[4], session)
+    for side, (axis, name, colour) in enumerate(((axes[5], "front", FRONT), (axes[6], "rear", REAR))):
         _area(axis, session, side, name, colour)
     axes[-1].set_xlabel("time (s)")
     for axis in axes:
@@ -73,6 +76,13 @@ def _tyres(axis: Axes, session: Recorded) -> None:
         axis.axhline(static_tyre_loads(session.rig)[side], color=colour, lw=0.7, ls=":", label=f"{name}, at rest")
     axis.axhline(0.0, color="k", lw=0.7)
     axis.set_ylabel("tyre force (N)\n0: contact lost")
+
+
+def _pressures(axis: Axes, session: Recorded) -> None:
+    for column, (name, colour) in enumerate((("front", FRONT), ("rear", REAR)), start=4):
+        axis.plot(session.measured_time, session.measured[:, column] * 1e-3, color=colour, lw=0.8, label=name)
+    axis.axhline(session.rig.supply_pressure.value * 1e-3, color="k", lw=0.7, ls="--", label="supply, by the rig file")
+    axis.set_ylabel("pressure\n(kPa, absolute)")
 
 
 def _orifices(axis: Axes, session: Recorded) -> None:

@@ -26,6 +26,7 @@ from pneumo_ros.rig.channels import (
     TRUE_TYRE_FORCES,
     spring_heights,
 )
+from pneumo_ros.session.warnings import MISSED
 from pneumo_ros.units import GRAVITY
 
 SETTLED = 1.0  # s; figures of ride and estimate leave out the start before it
@@ -222,18 +223,28 @@ REAL = 0.005  # a real-time session this close to 1 ran in real time
 def pace(summary: Summary) -> str:
     """``, in real time (factor 1.00)`` and the like, with the reason where a real-time session's factor is not 1."""
     if not np.isfinite(summary.speed):
-        return ""
+        return ", in real time; stopped before its end, so without a factor" if summary.mode == "realtime" else ""
     if summary.mode != "realtime":
         return f", at {summary.speed:.1f} x real time"
     text = f", in real time (factor {summary.speed:.2f})"
     if abs(summary.speed - 1.0) <= REAL:
         return text
-    missed = any(int(values.get("missed periods", "0")) for values in summary.loop.values())
+    missed = any(int(values.get(MISSED, "0")) for values in summary.loop.values())
     why = "periods were missed" if missed else "samples are missing at the start or end of the log"
     return f"{text}: {why}"
 
 
+# Beside the table of loops.
+STEPS_NOTE = "steps: up to each node's last report; it reports once a second, so the counts differ by up to that"
+
+
+def counts_missed(summary: Summary) -> bool:
+    """Whether a node of the session counts periods that it missed: not in lockstep, and not where a board samples."""
+    return summary.mode != "lockstep" and any(MISSED in values for values in summary.loop.values())
+
+
 OUT_OF_RANGE = "out of its range"
+NOTHING = 1e-9  # of any figure, in its unit: a rig at trim on a flat road moves by what rounding does
 LARGE = 3.0  # ratio from which a factor says more than per cent
 
 
@@ -244,7 +255,7 @@ def figures(values: Sequence[float], form: str) -> str:
 
 def change(ours: Sequence[float], theirs: Sequence[float]) -> str:
     """Per cent from theirs to ours, or the factor where it is large; nothing where there is none."""
-    return " / ".join(_change(a, b) for a, b in zip(ours, theirs, strict=False) if b and np.isfinite(a / b))
+    return " / ".join(_change(a, b) for a, b in zip(ours, theirs, strict=False) if abs(b) > NOTHING and np.isfinite(a))
 
 
 def _change(ours: float, theirs: float) -> str:

@@ -214,9 +214,13 @@ class Supervisor:
         self._hear()
 
     def failure_of_lead(self) -> str:
-        """What the lead had to say if it did not end well when it was stopped, else ''."""
+        """What the lead had to say if it did not end well when it was stopped, else ''.
+
+        A node that still begins has nothing that takes a signal: that it dies of the one sent here is as it was asked.
+        """
         code = self.lead.process.poll() if self.lead.process is not None else None
-        return describe_end(self.lead, code) if code else ""
+        begun = self._progress >= 0.0
+        return describe_end(self.lead, code) if code and (begun or code != -signal.SIGINT) else ""
 
     def _listen(self, node: NodeProcess, stream: IO[str]) -> None:
         for line in stream:

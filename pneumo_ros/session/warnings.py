@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pneumo_ros.log.decoded import Log
-from pneumo_ros.log.inspection import read_events
+from pneumo_ros.log.inspection import Event, read_events
 
 MISSED = "missed periods"
-STALE, TRIPPED = "estimate_stale", 2
+STALE, COMPLETE, TRIPPED = "estimate_stale", "session_complete", 2
 REFUSED = {  # node and key of its /diagnostics -> what it means
     ("controller", "refused commands"): "commands were not finite, so the valves were held at trim",
     ("daq", "refused commands"): "commands were refused by the driver (too old, or out of range)",
@@ -31,7 +31,7 @@ def warnings_of(log: Log, loop: Mapping[str, Mapping[str, str]], mode: str) -> t
     mode : lockstep or realtime
     """
     found = [] if mode == "lockstep" else _missed(loop)
-    events = list(read_events(log))
+    events = of_the_session(list(read_events(log)))
     late = sum(event.code == STALE for event in events)
     if late:
         often = "once" if late == 1 else f"{late} times"
@@ -42,6 +42,12 @@ def warnings_of(log: Log, loop: Mapping[str, Mapping[str, str]], mode: str) -> t
             found.append(f"{count} {meaning}" if count > 1 else f"1 {_one(meaning)}")
     trips = Counter(event.message for event in events if event.level >= TRIPPED)
     return (*found, *(f"error: {text}" + (f" ({n} times)" if n > 1 else "") for text, n in trips.items()))
+
+
+def of_the_session(events: Sequence[Event]) -> list[Event]:
+    """Without late estimates after its end: the nodes end one after the other, the estimator first."""
+    end = next((k for k, event in enumerate(events) if event.code == COMPLETE), len(events))
+    return [event for k, event in enumerate(events) if k <= end or event.code != STALE]
 
 
 def _one(meaning: str) -> str:

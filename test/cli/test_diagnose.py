@@ -42,7 +42,13 @@ def test_what_comes_next_runs_on_the_bench_that_the_log_is_of(tmp_path: Path) ->
     daq = "node: daq\nparameters: {port: /dev/ttyACM0, calibration: mine.yaml, baud: 921600}\n"
     bench = write(tmp_path / "bench.mcap", [*contract_log(20), ("/rig/setup", STRING, T0, text(daq))])
     assert _bench(bench) == ("--source", "serial", "--port", "/dev/ttyACM0", "--calibration", "mine.yaml")
-    assert _bench(write(tmp_path / "simulated.mcap", contract_log(20))) == ()
+    plant = "node: plant\nparameters: {simulated_rig: 'my rig.yaml', seed: 1}\n"
+    hidden = write(tmp_path / "hidden.mcap", [*contract_log(20), ("/rig/setup", STRING, T0, text(plant))])
+    assert _bench(hidden) == ("--set", "plant.simulated_rig=my rig.yaml")  # not the rig that the nodes were told
+    nominal = ("/rig/setup", STRING, T0, text(plant.replace("'my rig.yaml'", "''")))
+    plain = write(tmp_path / "plain.mcap", [*contract_log(20), nominal])
+    assert _bench(plain) == ("--source", "sim")
+    assert _bench(write(tmp_path / "foreign.mcap", contract_log(20))) == ()
 
 
 def damped_log(path: Path, seed: int, own_effect: Path, payload: float = 0.0) -> Path:

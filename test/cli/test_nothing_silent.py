@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import LIMITS, NamedEffect, load_rig, parse_rig
 from pneumo_ros.rig.parameters import OPTIONAL
+from pneumo_ros.session.supervisor import NodeProcess, Supervisor
 
 POINTS = "channel,reference,unit,volts\n" + "".join(f"sprung_front,{k * 0.01},m,{k * 0.5}\n" for k in range(6))
 
@@ -91,3 +93,30 @@ def test_early_ctrl_c_is_one_line(tmp_path: Path, after: float) -> None:
     said, _ = process.communicate(timeout=60)
     assert said.strip().count("\n") == 0 and said.strip().startswith("stopped by the user"), said
     assert process.returncode in (130, -signal.SIGINT) and not (tmp_path / "x.mcap").exists()
+
+
+@pytest.mark.realtime  # the batch's processes must be up
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_ctrl_c_of_a_batch_is_told_once(tmp_path: Path, workers: str) -> None:
+    """The terminal sends it to every process of the batch."""
+    command = [sys.executable, "-m", "pneumo_ros.cli.main", "blind", "make", str(tmp_path / "set"), "--set", "ci",
+               "--workers", workers]  # fmt: skip
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+    time.sleep(6.0)
+    os.killpg(process.pid, signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert said.count("stopped by the user") == 1 and "Traceback" not in said and "failed" not in said, said
+    assert process.returncode == 130
+
+
+@pytest.mark.parametrize(("begun", "told"), [(False, ""), (True, "node plant was killed by SIGINT")])
+def test_a_node_that_still_begins_may_die_of_the_end_that_was_asked_for(begun: bool, told: str) -> None:
+    """Its death was told as what came before the user's Ctrl-C, with exit code 1."""
+    supervisor = Supervisor([NodeProcess("plant", "")], {}, "plant")
+    with subprocess.Popen(["sleep", "60"]) as process:
+        supervisor.lead.process = process  # type: ignore[assignment]  # nobody reads what it says
+        supervisor._progress = 0.5 if begun else -1.0
+        supervisor.stop()
+    assert supervisor.failure_of_lead() == told

@@ -307,7 +307,8 @@ def test_the_running_rig_is_shown_stopped_and_outlived(tmp_path: Path) -> None:
         tab.click("EMERGENCY STOP")
         tab.wait(lambda: "emergency stop: done" in tab.model("answers", "text"), "the stop to be confirmed")
         tab.wait(lambda: tab.model("set-controller-pole", "value"), "the gains")
-        assert tab.model("set-controller-pole", "title") == "controller.pole (1/s)"
+        assert tab.model("set-controller-pole", "title") == "controller.pole (1/s, 0.5 to 200)"
+        assert tab.model("set-controller-follow_axles", "label") == "controller.follow_axles: off"
         assert tab.model("gains", "visible") is False  # the pictures come first
         tab.click("Parameters")
         tab.wait(lambda: tab.model("gains", "visible"), "the parameters to unfold")

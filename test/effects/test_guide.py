@@ -3,16 +3,21 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from pneumo_ros.cli.effects import app
+from pneumo_ros.effects.expected import SUPPLY, choked, falling, sagged, settling
 from pneumo_ros.effects.guide import displayed
 from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.sheet import check_words, effects_page
 from pneumo_ros.errors import InputError
+from pneumo_ros.plant.air_spring import pressure_rate
+from pneumo_ros.plant.half_car import gas_of
+from pneumo_ros.rig import load_rig
 
 LIBRARY = laws_of(load_library())
 HEAD = (
@@ -36,6 +41,33 @@ def test_the_check_takes_what_was_found() -> None:
     said = check_words(LIBRARY["coulomb_friction"], {"friction_force": 16.2})
     assert "twice 16.2 N between up and down" in said
     assert displayed(0.0042, "m") == "4.2 mm" and displayed(0.03, "1") == "3 %" and displayed(2e-7, "m2") == "0.2 mm2"
+
+
+RIDDLE = re.compile(r"\bsome (mm|ms|s|kPa|N|periods)\b|in a bend|s/g|N/m\b|by itself|\{")
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_a_check_says_what_to_do_and_what_number_is_seen(name: str) -> None:
+    """With a value and its unit; without one it says what is looked for, in which unit, and where to find how much."""
+    effect = LIBRARY[name]
+    assert effect.guide is not None
+    said = check_words(effect)
+    assert not RIDDLE.search(said), said
+    assert re.search(r"\d (N|Hz|mm|mm2|cm3|ms|kPa|kPa/s|%|kg|N/mm|N s/m)\b|\d %", said), said
+    bare = effect.guide.check_with({p.name: (None, p.unit) for p in effect.parameters})
+    assert not RIDDLE.search(bare) and bare.endswith("; read the size off the curve in the report"), bare
+    assert re.search(r"\bthe [a-z ]+ \((N|Hz|mm|mm2|cm3|ms|kPa|kPa/s|%|kg|N/mm|N s/m)\)", bare), bare
+
+
+def test_numbers_that_are_no_parameter_follow_from_the_rig() -> None:
+    """A hole's fall of pressure by the plant's own equation; heat and sag by what they must give in their limits."""
+    rig = load_rig()
+    rate = pressure_rate(3e5, rig.design_height.value, 0.0, 0.0, 2e-7, gas_of(rig, reference_pressure=3e5))
+    assert falling({"leak_area": 2e-7}) == pytest.approx(-rate, rel=1e-3)
+    assert settling({"wall_conductance": 0.4}) == pytest.approx(settling({"wall_conductance": 0.2}) / 2.0)
+    assert choked(2e-6, SUPPLY) == pytest.approx(3.7e-3, rel=0.01)  # as the check has it
+    assert sagged({"supply_resistance": 1e5}) == pytest.approx(1e5 * choked(2e-6, SUPPLY), rel=1e-3)
+    assert sagged({"supply_resistance": 1e12}) == pytest.approx(SUPPLY, rel=1e-3)
 
 
 @pytest.mark.parametrize("width", ["80", "120"])

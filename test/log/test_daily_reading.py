@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from helpers.rig_logs import noisy, simulated, write_log
-from helpers.small_logs import contract_log, write
+from helpers.small_logs import STORE, contract_log, header, write
 from scipy.io import loadmat
 from typer.testing import CliRunner
 
@@ -20,6 +20,7 @@ from pneumo_ros.errors import InputError
 from pneumo_ros.log.comparison import align, compare
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.log.tables import merged
+from pneumo_ros.log.topics import DIAGNOSTICS
 from pneumo_ros.rig import load_rig
 
 
@@ -103,12 +104,33 @@ def test_one_merged_table_in_every_format(tmp_path: Path, logs: tuple[Path, Path
     assert isinstance(error, InputError) and "exists already" in str(error)
 
 
+def test_messages_of_different_lengths_go_to_matlab(tmp_path: Path) -> None:
+    """A session's events carry one value or several: cells that a message does not have were an error."""
+    kinds = STORE.types
+    values = [kinds["diagnostic_msgs/msg/KeyValue"]("code", code) for code in ("armed", "2")]
+    messages = []
+    for number, own in enumerate((values[:1], values)):
+        status = kinds["diagnostic_msgs/msg/DiagnosticStatus"](1, "daq", f"message {number}", "", own)
+        array = kinds[DIAGNOSTICS](header(10**9 + number), [status] * (number + 1))
+        messages.append(("/rig/events", DIAGNOSTICS, 10**9 + number, array))
+    write(tmp_path / "e.mcap", messages)
+    said("export", tmp_path / "e.mcap", "-o", tmp_path, "-f", "mat")
+    found = loadmat(tmp_path / "rig_events.mat", simplify_cells=True)
+    assert list(found["status_0__message"]) == ["message 0", "message 1"]
+    assert found["status_1__message"][1] == "message 1" and len(found["status_1__message"][0]) == 0
+    assert np.isnan(found["status_1__level"][0]) and found["status_1__level"][1] == 1.0
+
+
 def test_recorded_valves_play_through_any_rig(tmp_path: Path, logs: tuple[Path, Path, Path]) -> None:
     """The rig the log was made on gives the log again, to its noise; a heavier one does not."""
     same = CliRunner().invoke(replay_app, [str(logs[0]), "--open-loop"], env={"COLUMNS": "100"})
     assert same.exit_code == 0, same.output
     rows = [line.split() for line in same.output.splitlines() if line.strip().startswith(("sprung", "unsprung"))]
     assert len(rows) == 4 and all(float(row[-1]) < 0.02 for row in rows)
+    assert all(row[1] == "mm" and 0.1 < float(row[2]) < 100.0 for row in rows)
+    assert "kPa" in same.output and "e+0" not in same.output and "off by: rms difference" in same.output
+    narrow = CliRunner().invoke(replay_app, [str(logs[0]), "--open-loop"], env={"COLUMNS": "80"}).output
+    assert max(map(len, narrow.splitlines())) <= 80 and "off by, of std" in narrow
     (tmp_path / "heavy.yaml").write_text("rig: {sprung_mass: {value: 60.0, std: 0.1, unit: kg}}", encoding="utf-8")
     words = [str(logs[0]), "--open-loop", "--rig", str(tmp_path / "heavy.yaml")]
     heavy = CliRunner().invoke(replay_app, words, env={"COLUMNS": "100"})

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,10 @@ def test_gaps_are_counted(tmp_path: Path) -> None:
     topics = {t.name: t for t in inspect_log(log).topics}
     timing = topics["/rig/front/pressure"].timing
     assert timing.missing == 4 and [round(g.length / 2e-3) for g in timing.gaps] == [4, 2]
+    assert timing.gaps_in_words == "4 samples missing in 2 gaps, the longest 0.008 s"
+    one = replace(timing, missing=1, gaps=timing.gaps[1:])
+    assert one.gaps_in_words == "1 sample missing in 1 gap, the longest 0.004 s"
+    assert replace(timing, missing=0, gaps=()).gaps_in_words == ""
     assert timing.gaps[0].start_ns == T0 + 49 * PERIOD and timing.rate_hz == pytest.approx(500.0)
     whole = topics["/rig/rear/pressure"].timing
     assert whole is not None and whole.missing == 0 and whole.delay_p50 == pytest.approx(1e-3) and whole.jumps == 0

@@ -25,7 +25,16 @@ from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
 from pneumo_ros.road import build_road
 from pneumo_ros.session.picture import draw_session
-from pneumo_ros.session.summary import Recorded, change, figures, load_session, pace, summarise
+from pneumo_ros.session.report.contents import loop_rows
+from pneumo_ros.session.summary import (
+    Recorded,
+    change,
+    counts_missed,
+    figures,
+    load_session,
+    pace,
+    summarise,
+)
 from pneumo_ros.session.warnings import warnings_of
 
 PERIOD = 2e-3
@@ -118,6 +127,7 @@ def test_a_rating_that_left_its_scale_is_no_zero(simulated: Recorded) -> None:
 
 def test_a_large_change_is_a_factor() -> None:
     assert change([55.97], [1.0]) == "x 56" and change([0.5, 1.2], [1.0, 1.0]) == "-50 % / +20 %"
+    assert change([0.36, 1.0], [1e-15, 2e-15]) == ""  # a flat road: nothing moves by itself
     assert figures([float("nan")], "%.2f") == "out of its range"
 
 
@@ -127,6 +137,7 @@ def test_a_large_change_is_a_factor() -> None:
         ("realtime", 1.0, "0", "in real time (factor 1.00)"),
         ("realtime", 0.9, "31", "in real time (factor 0.90): periods were missed"),
         ("realtime", 0.9, "0", "in real time (factor 0.90): samples are missing at the start or end of the log"),
+        ("realtime", float("nan"), "0", "in real time; stopped before its end, so without a factor"),
         ("lockstep", 4.2, "0", "at 4.2 x real time"),
     ],
 )
@@ -134,7 +145,24 @@ def test_the_pace_says_why(simulated: Recorded, mode: str, speed: float, missed:
     loop = {"plant": {"steps": "100", "missed periods": missed}}
     summary = dataclasses.replace(summarise(simulated, loop), mode=mode, speed=speed)
     assert pace(summary).endswith(told)
-    assert ("missed" in said(timing_table(summary), 120).replace("were missed", "")) == (mode == "realtime")
+    shown = said(timing_table(summary), 120)
+    assert ("missed" in shown.replace("were missed", "")) == (mode == "realtime")
+    assert "steps: up to each node's last report" in shown  # why the nodes' counts differ
+
+
+def test_a_board_that_samples_has_no_column_of_missed_periods(simulated: Recorded) -> None:
+    """Its nodes answer to samples and have no periods of their own; an empty column would read as none missed."""
+    summary = dataclasses.replace(summarise(simulated, {"daq": {"steps": "100"}}), mode="realtime", speed=1.0)
+    assert "missed" not in said(timing_table(summary), 120) and not counts_missed(summary)
+    assert all(len(row) == 8 for row in loop_rows(summary))
+
+
+def test_estimates_that_end_with_the_session_are_no_warning(tmp_path: Path) -> None:
+    late = (1, "estimate_stale", "no estimate for 24 ms: safe command")
+    log = log_of_events(tmp_path / "e.mcap", (0, "session_complete", "the session's duration has passed"), late)
+    assert warnings_of(log, {}, "realtime") == ()
+    other = log_of_events(tmp_path / "f.mcap", late, (0, "session_complete", "the session's duration has passed"))
+    assert len(warnings_of(other, {}, "realtime")) == 1
 
 
 def log_of_events(path: Path, *events: tuple[int, str, str]) -> Log:

@@ -21,6 +21,8 @@ NAMED: Final = "#1c6fb8"  # colour of a named effect [display]
 OTHER: Final = "#adb5bd"  # colour of the tolerances [display]
 LEFT: Final = "#f06514"  # colour of the remainder [display]
 DENSE: Final = 0.25  # share of the fullest bin: thinner ones are drawn faint [display]
+LETTER: Final = 0.07  # inch, width of a label's letters in the mean [display]
+BARS: Final = 2.8  # inch, width of the waterfall [display]
 SHOWN: Final = 0.005  # share of the gap below which the waterfall has no row [display]
 
 
@@ -52,8 +54,10 @@ def waterfall(rows: Sequence[Mapping[str, Any]], blamed: bool = True) -> str:
     ``blamed`` : whether something is missing; where nothing is, what is left is painted as quietly as the rest
     """
     height = 0.36 * len(rows) + 0.55
-    figure = Figure(figsize=(6.4, height))
-    axes = figure.add_axes((0.44, 0.45 / height, 0.44, 1.0 - 0.5 / height))
+    before = LETTER * max(len(row["words"]) for row in rows) + 0.15
+    width = before + BARS + 0.75
+    figure = Figure(figsize=(width, height))
+    axes = figure.add_axes((before / width, 0.45 / height, BARS / width, 1.0 - 0.5 / height))
     left = 1.0
     colours = {"effect": NAMED, "refit": OTHER, "rest": LEFT if blamed else OTHER, "floor": "#dee2e6"}
     for k, row in enumerate(rows):

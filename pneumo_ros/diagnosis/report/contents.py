@@ -33,6 +33,8 @@ from pneumo_ros.diagnosis.report.words import (
 from pneumo_ros.diagnosis.result import DIFFERS
 
 ZOOM: Final = 6.0  # slowest periods of overlay shown, where the refitted model is furthest off [display]
+# above the budget of a verdict without a name [display]
+BUDGET_OF_UNKNOWN: Final = "No name was accepted. This is what those that came closest would make of the gap:"
 SHOWN_CHANNELS: Final = 2  # channels that are shown at once; the others are folded away [display]
 
 
@@ -92,6 +94,7 @@ def contents(found: Findings) -> dict[str, Any]:
     blamed = told_of and summary["verdict"] != "none"  # where nothing is missing, no part of the rig is painted
     shares = _shares(summary) if blamed else {}
     charts, first = _charts(found), told(found)
+    whole = dict(zip(shares, whole_percents(list(shares.values())), strict=True))
     return {
         "title": f"Gap of {_rig_name(found)}",
         "verdict": summary["verdict"],
@@ -103,13 +106,14 @@ def contents(found: Findings) -> dict[str, Any]:
         "next_steps": [{"text": step.text, "commands": step.commands} for step in first.steps],
         "waterfall": waterfall(budget_rows(summary), blamed) if told_of and summary.get("budget") else "",
         "measured": _measured(summary) if blamed else [],
-        "map": found.card.picture(shares),
+        "budget_note": BUDGET_OF_UNKNOWN if summary["verdict"] == "unknown" and summary.get("budget") else "",
+        "map": found.card.picture({place: percents / 100.0 for place, percents in whole.items()}),
         "places": [
-            {"name": place, "words": place_words(place), "share": whole}
-            for place, whole in zip(shares, whole_percents(list(shares.values())), strict=True)
-            if whole >= 1
+            {"name": place, "words": place_words(place), "share": percents}
+            for place, percents in whole.items()
+            if percents >= 1
         ],
-        "laws": [_law(law) for law in found.laws] if blamed else [],
+        "laws": _laws(found.laws) if blamed else [],
         "ladder": ladder(_rungs(summary["gap"], found.mended)),
         "charts": charts[:SHOWN_CHANNELS],
         "more_charts": charts[SHOWN_CHANNELS:],
@@ -233,14 +237,23 @@ def _candidate(entry: Mapping[str, Any], phrases: Mapping[str, str]) -> dict[str
     }
 
 
-def _law(law: Law) -> dict[str, str]:
+def _laws(laws: Sequence[Law]) -> list[dict[str, str]]:
+    """Each cloud once, with all places that it was seen for: two places may stand in one balance."""
+    places: dict[str, list[str]] = {}
+    for law in laws:
+        places.setdefault(f"{law.equation} {law.quantity}", []).append(place_words(law.place))
+    once = {f"{law.equation} {law.quantity}": law for law in laws}
+    return [_law(law, " or ".join(places[key])) for key, law in once.items()]
+
+
+def _law(law: Law, where: str) -> dict[str, str]:
     (x_unit, x_factor), (y_unit, y_factor) = readable(law.quantity_unit, law.x), readable(law.unit, law.y)
     what = {"N": "missing force", "N m": "missing moment", "kg/s": "missing inflow"}[law.unit]
     curve = (law.centres * x_factor, law.means * y_factor)
     labels = (f"{law.quantity}, {x_unit}", f"{what}, {y_unit}")
     return {
         "plot": scatter(law.x * x_factor, law.y * y_factor, curve, labels),
-        "text": f"What the re-estimated model misses at {place_words(law.place)}, seen in the balance of the "
+        "text": f"What the re-estimated model misses at {where}, seen in the balance of the "
         f"{law.equation.replace('_', ' ')}. Of all quantities, {law.quantity} explains most of it: "
         f"{100 * law.explained:.0f} %.",
     }
@@ -249,7 +262,9 @@ def _law(law: Law) -> dict[str, str]:
 def _parameters(summary: Mapping[str, Any]) -> list[dict[str, str]]:
     if not summary.get("ranking"):
         return []
-    return [quantity_cells(name, value) for name, value in winner(summary)["parameters"].items()]
+    found = winner(summary)["parameters"].items()
+    # A part of a shape that is absent stands at nothing, with nothing to vary.
+    return [quantity_cells(name, q) for name, q in found if (q["value"], q.get("std", 0.0)) != (0.0, 0.0)]
 
 
 # sentence above the rivals of a verdict [display]

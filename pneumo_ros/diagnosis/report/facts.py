@@ -27,6 +27,7 @@ from pneumo_ros.diagnosis.report.words import (
     winner,
 )
 from pneumo_ros.diagnosis.result import DIFFERS
+from pneumo_ros.effects.guide import NO_NUMBER, OFF_THE_CURVE
 from pneumo_ros.effects.parameters import family_of
 
 TOLD: Final = 3  # signals, rivals and own parameters that are told first [display]
@@ -55,11 +56,11 @@ class Gain:
 def places(summary: Mapping[str, Any]) -> str:
     """Where it acts, with shares that add up to at most 100 %."""
     found = [(str(e["place"]), float(e["share"])) for e in summary.get("location") or []]
-    shown = [(place, share) for place, share in found if share >= STANDS_OUT]
-    shares = whole_percents([share for _, share in shown])
-    if not shown:
+    whole = whole_percents([share for _, share in found])
+    words = [f"{place_words(place)} {percents} %" for (place, share), percents in zip(found, whole, strict=True)
+             if share >= STANDS_OUT]  # fmt: skip
+    if not words:
         return "no place stands out"
-    words = [f"{place_words(place)} {share} %" for (place, _), share in zip(shown, shares, strict=True)]
     return f"{', '.join(words)} of the gap that re-estimated parameters leave"
 
 
@@ -104,23 +105,25 @@ def check(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> str:
     several = len(entry["effects"]) > 1
     out = []
     for name in entry["effects"]:
-        differs = any(one["law"] == DIFFERS and name in one["effects"] for one in summary.get("budget") or [])
-        words = _by_hand({} if differs else entry["parameters"], name, library)
+        budget = [one for one in summary.get("budget") or [] if one["law"] == DIFFERS and name in one["effects"]]
+        unsaid = OFF_THE_CURVE if any(one.get("curve") for one in budget) else NO_NUMBER
+        words = _by_hand({} if budget else entry["parameters"], name, library, unsaid)
         out += [f"{effect_name(name)}: {words}" if several else words] if words else []
     return "; ".join(out)
 
 
-def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, ToldEffect]) -> str:
+def _by_hand(parameters: Mapping[str, Any], family: str, library: Mapping[str, ToldEffect], unsaid: str) -> str:
     """The check of the family's law that was found; '' where it has none.
 
-    ``parameters`` : that were found; none where the law differs from the library's and its numbers mean little.
+    ``parameters`` : that were found; none where the law differs from the library's and its numbers mean little
+    ``unsaid`` : where such numbers are found instead
     """
     laws = [e for e in library.values() if family_of(e.id) == family and e.guide is not None]
     for effect in sorted(laws, key=lambda e: e.id):
         values = {p.name: (_value(parameters, family, p.name), p.unit) for p in effect.parameters}
         known = {name for name, (value, _) in values.items() if value is not None}
         if effect.guide is not None and (not parameters or effect.guide.names() <= known):
-            return effect.guide.check_with(values)
+            return effect.guide.check_with(values, unsaid)
     return ""
 
 
@@ -140,6 +143,8 @@ def rivals(summary: Mapping[str, Any], library: Mapping[str, ToldEffect]) -> str
         words = effect_name(name).replace("+", " and ")
         words += f" ({percent(float(entry['probability']))})" if entry and float(entry["probability"]) >= 0.005 else ""
         differs = next((_difference(library, one, name) for one in own if _difference(library, one, name)), "")
+        guide = library[name].guide if name in library else None
+        differs = differs or ("" if guide is None else guide.meaning.rstrip("."))  # what it is, where nobody compared
         out.append(f"{words}: {differs}" if differs else words)
     return "; ".join(out)
 
@@ -198,7 +203,7 @@ def why_not(summary: Mapping[str, Any]) -> str:
     entry = nearest(summary)
     if entry is None:
         return ""
-    reasons = []
+    reasons, stopped = [], _stopped(entry)
     for effect in entry["effects"]:
         share = evidence.get(f"closes:{effect}")
         if share is not None and float(share) < limits.closes:
@@ -210,7 +215,7 @@ def why_not(summary: Mapping[str, Any]) -> str:
             reasons.append(f"whatever may act at {where or 'another place'} in place of {effect_name(effect)} leaves "
                            f"{percent(instead)} of what it leaves")  # fmt: skip
         bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
-        if bounded >= limits.at_bounds:
+        if bounded >= limits.at_bounds and not stopped:
             reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
         if float(evidence.get(f"follows:{effect}", 1.0)) < 1.0:
             reasons.append("the reading stops at an end of its range, as that of a sensor at its limit does")
@@ -218,18 +223,41 @@ def why_not(summary: Mapping[str, Any]) -> str:
         reasons.append("it does not shrink the held-out gap")
     if float(evidence.get("effects") or 0.0) == 0.0:
         reasons.append("on the blocks kept from the fit no effect helps more than chance does")
-    reasons += [str(note) for note in entry.get("notes") or ()]
+    reasons += [stopped] if stopped else []
+    reasons += [str(note) for note in entry.get("notes") or () if not str(note).endswith(_TOLD_OTHERWISE)]
     return "; ".join(reasons) or "what it leaves is more than a right law would"
+
+
+_TOLD_OTHERWISE: Final = ("ended at its bound", "moves no output")  # notes on parameters [definition]
+
+
+def _stopped(entry: Mapping[str, Any]) -> str:
+    """Which parameters of a structure stand at an end of their range; '' where none does."""
+    ends = {name: q for name, q in entry["parameters"].items() if q.get("at_bound") and q["value"] is not None}
+    words = [
+        f"{name.rpartition('.')[2].replace('_', ' ')} ({quantity_words(name, {**q, 'std': 0.0})})"
+        for name, q in ends.items()
+    ]
+    if not words:
+        return ""
+    verb = "stops at an end of its range" if len(words) == 1 else "stop at the ends of their ranges"
+    return f"{', '.join(words)} {verb}, where no part of a rig is likely to be"
 
 
 def measured(summary: Mapping[str, Any]) -> str:
     """What was measured of the law that has no name."""
     rest = summary.get("remainder") or {}
     curve = rest.get("curve")
-    if not curve:
+    if curve:
+        at = " and ".join(place_words(place) for place in rest["places"])
+        return f"at {at}, {_curve_words(curve)}; its curve is in the report"
+    # Where the names that came closest leave next to nothing, what they do together is the law that has no name.
+    held = next((one for one in summary.get("budget") or [] if one.get("curve")), None)
+    if held is None:
         return ""
-    at = " and ".join(place_words(place) for place in rest["places"])
-    return f"at {at}, {_curve_words(curve)}; its curve is in the report"
+    at = " and ".join(place_words(place) for place in held["places"])
+    return (f"at {at}, with {effect_name(held['family'])} of any law in its place, {_curve_words(held['curve'])}; its "
+            "curve is in the report")  # fmt: skip
 
 
 def _curve_words(curve: Mapping[str, Any]) -> str:
@@ -281,6 +309,6 @@ def fate(summary: Mapping[str, Any], name: str) -> str:
         order = [str(t["candidate"]) for t in summary["tried"]]
         number = order.index(str(tried[0]["candidate"])) + 1
         left = tried[0]["gap_fit"]
-        words = "it ran away" if left is None else f"{float(left):.3g} left"
-        return f"{name} was fitted and is number {number} of {len(order)}: {words}"
+        words = "it ran away" if left is None else f"it leaves a gap of {float(left):.3g} on the fitted logs"
+        return f"{name} was fitted and came out number {number} of {len(order)}: {words}"
     return f"{name} scored too low in the screening to be fitted"

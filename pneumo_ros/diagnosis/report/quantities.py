@@ -44,7 +44,7 @@ def _shown(unit: str) -> str:
 # SI unit -> (unit shown, factor, smallest value in SI that it is used from) [display]
 _READABLE: Final = {
     "m": (("mm", 1e3, 0.5), ("µm", 1e6, 5e-4)), "m2": (("mm²", 1e6, 1e-2),), "m3": (("cm³", 1e6, 1e-2),),
-    "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 5e-3)),
+    "Pa": (("kPa", 1e-3, np.inf),), "s": (("ms", 1e3, 0.5),), "kg/s": (("g/s", 1e3, 0.5), ("mg/s", 1e6, 1e-3)),
 }  # fmt: skip
 
 

@@ -34,7 +34,7 @@ class Asked:
     output : the diagnosis' folder, as typed
     rig : the file of --save-rig; None where none was wanted
     options : of the diagnosis, to be repeated
-    rig_options : of ``pneumo run`` for the rig that the logs are of; none for the simulated one
+    rig_options : of ``pneumo run`` for the rig that the logs are of; none where another recorder made them
     program : how ``pneumo`` was called: a path, where the shell would not find the name
     """
 
@@ -117,8 +117,16 @@ def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
     length = str(experiment.get("command", "")).rpartition("--duration ")[2].split(" ")[0] or "12"
     run = asked.session(*(word for pair in files.items() for word in pair), "--duration", length, output=played)
     text = str(experiment["description"]).rstrip(".")
-    elsewhere = "" if asked.rig_options else " (on hardware with --source serial --port PORT)"
-    return Step(f"Split the rivals: {text}{elsewhere}.", (run, asked.diagnosis(played, output=_another(asked.output))))
+    return Step(
+        f"Split the rivals: {text}.{_where(asked)}", (run, asked.diagnosis(played, output=_another(asked.output)))
+    )
+
+
+def _where(asked: Asked) -> str:
+    """A sentence for logs that do not say which rig made them: another one's session would mix two rigs."""
+    return "" if asked.rig_options else (
+        " Only a session of the rig that made the logs tells; the command runs the simulated one, on hardware add "
+        "--source serial --port PORT --calibration FILE.")  # fmt: skip
 
 
 def _second(asked: Asked) -> Path:
@@ -132,7 +140,7 @@ def _another(folder: Path) -> Path:
 def _more(asked: Asked, text: str, options: str) -> Step:
     played = _second(asked)
     run = asked.session(*options.split(), "--duration", "20", output=played)
-    return Step(text, (run, asked.diagnosis(played, output=_another(asked.output))))
+    return Step(f"{text}{_where(asked)}", (run, asked.diagnosis(played, output=_another(asked.output))))
 
 
 def _look_closer(summary: Mapping[str, Any], asked: Asked) -> Step:

@@ -150,13 +150,13 @@ def interval(low: float, high: float) -> str:
 
 
 def whole_percents(shares: Sequence[float]) -> list[int]:
-    """Shares as whole per cent that add up to what their sum rounds to, and to no more than 100."""
+    """Shares as whole per cent, each rounded; where that is more than 100 together, those rounded up most give way."""
     total = sum(max(share, 0.0) for share in shares)
     scaled = [100.0 * max(share, 0.0) / max(total, 1.0) for share in shares]
-    out = [int(value) for value in scaled]
-    spare = round(sum(scaled)) - sum(out)
-    for k in sorted(range(len(out)), key=lambda k: out[k] - scaled[k])[:spare]:
-        out[k] += 1
+    out = [round(value) for value in scaled]
+    above = max(sum(out) - 100, 0)
+    for k in sorted(range(len(out)), key=lambda k: scaled[k] - out[k])[:above]:
+        out[k] -= 1
     return out
 
 

@@ -88,13 +88,15 @@ def _moving(drive: Array | None) -> Array | None:
 
 
 def _delay(values: Array, weight: Array, drive: Array) -> int:
-    """Rows from a command to its onset in the channel: where the differences of both have the largest product."""
-    whole = _whole(weight, ONSET_ORDER)
-    rest = np.where(whole, np.diff(values, n=ONSET_ORDER), 0.0)
-    steps = np.diff(drive, n=ONSET_ORDER - 1, axis=0)[:-1]
-    longest = min(LONGEST_DELAY, len(rest) // 2)
-    agreement = [np.abs(rest[late:] @ steps[: len(rest) - late]).max() for late in range(longest)]
-    return int(np.argmax(agreement)) if agreement else 0
+    """Rows from a command to its onset in the channel: where the drive explains most of the differences.
+
+    Not where both agree best: a loop's command follows what it did a few rows before, and agrees there as well. One
+    row off, half of what the command carries into the channel counts as noise.
+    """
+    longest = min(LONGEST_DELAY, len(values) // 4)
+    left = [_beside_drive(values, weight, drive, late, ONSET_ORDER) for late in range(longest)]
+    found = [(estimate, late) for late, estimate in enumerate(left) if np.isfinite(estimate)]
+    return min(found)[1] if found else 0
 
 
 def _beside_drive(values: Array, weight: Array, drive: Array, delay: int, order: int) -> float:

@@ -68,9 +68,9 @@ EFFECT = Effect(
             " any speed."
         ),
         check=(
-            "close both valves, move the body slowly over some mm and back with a spring balance: the force opens"
-            " a loop of {hysteresis_force} half width that does not shrink with slower motion and is gone with "
-            "the bellows off"
+            "close both valves, move the body slowly over 10 mm and back with a spring balance: between there and "
+            "back the force differs by up to twice {hysteresis_force}; slower motion does not shrink this loop, "
+            "and with the bellows off it is gone"
         ),
         mistaken_for={
             "coulomb_friction": "stays with the bellows off, and its loop has square corners",

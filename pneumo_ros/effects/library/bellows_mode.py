@@ -73,8 +73,8 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The bellows' own mass swings inside the strut: force and motion have a narrow resonance.",
         check=(
-            "tap the bellows with the rig at rest and the LVDTs logged: a ring of about {mode_frequency} that "
-            "dies within some periods; a clamp on the bellows moves it"
+            "log the LVDTs with the rig at rest and tap the bellows: they ring at about {mode_frequency}, each "
+            "swing smaller than the last one; a clamp on the bellows changes that frequency"
         ),
         mistaken_for={"tyre_damping": "changes wheel hop's height but rings at no frequency of its own"},
     ),

@@ -57,8 +57,8 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The bump stop is touched earlier, or is harder, than modelled.",
         check=(
-            "push the body down slowly with a ruler at the strut: contact comes {stop_lead} before the stop of "
-            "the rig file, and from there on the force rises by {stop_stiffness}"
+            "push the body down slowly with a force gauge and a ruler at the strut: the stop is met earlier than "
+            "the rig file has it, by {stop_lead}, and from there on the force rises by {stop_stiffness}"
         ),
         mistaken_for={"effective_area_error": "acts at all heights, a stop only below one"},
     ),

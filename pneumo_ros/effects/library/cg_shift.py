@@ -34,7 +34,10 @@ EFFECT = Effect(
     plant=plant,
     guide=Guide(
         meaning="The centre of mass is not where the rig file says.",
-        check="weigh front and rear axle: their ratio puts the centre {cg_shift_forward} further forward",
+        check=(
+            "weigh front and rear axle: their ratio puts the centre of mass further forward than the rig file has "
+            "it, by {cg_shift_forward}"
+        ),
         mistaken_for={"payload": "changes the sum of both scales"},
     ),
 )

@@ -33,7 +33,8 @@ EFFECT = Effect(
     guide=Guide(
         meaning="Hoses and fittings hold air beside the spring: it is softer and fills more slowly.",
         check=(
-            "measure hose length and bore, or disconnect the hose at the spring and fill it with water: {dead_volume}"
+            "measure length and bore of the hose, or disconnect it at the spring and fill it with water: it takes "
+            "{dead_volume}"
         ),
         mistaken_for={
             "heat_transfer": "softens slow strokes only",

@@ -32,7 +32,10 @@ EFFECT = Effect(
     inputs=inputs,
     guide=Guide(
         meaning="The road exciter follows its command late and rounds its corners.",
-        check="put an LVDT or dial gauge on the exciter's table and play a step: it arrives {exciter_lag} late",
+        check=(
+            "put an LVDT or dial gauge on the exciter's table and play a step: the table has gone two thirds of "
+            "the way {exciter_lag} after the command"
+        ),
         mistaken_for={"tyre_damping": "leaves the exciter's own position right"},
     ),
 )

@@ -16,6 +16,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS, Effect
+from pneumo_ros.effects.expected import FALL
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
@@ -53,9 +54,10 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The spring, a fitting or the closed outlet lets air out.",
         check=(
-            "close all valves at design height, wait 60 s, watch the pressure fall while the height sinks; soap "
-            "water shows the place. As a hole it has {leak_area}"
+            "block the body at design height, fill the spring to 3 bar absolute, close all valves and log the "
+            "pressure: it falls by {fall} at first; soap water shows the place, a hole of {leak_area}"
         ),
+        expects={"fall": FALL},
         mistaken_for={
             "supply_droop": "happens only while air is drawn",
             "orifice_coefficient": "acts only through open valves",

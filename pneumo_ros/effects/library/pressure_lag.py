@@ -45,8 +45,8 @@ EFFECT = Effect(
     guide=Guide(
         meaning="A pressure sensor reports late: a long thin gauge line, or a filter.",
         check=(
-            "open the spring to the atmosphere at one stroke: the sensor follows with {sensor_lag}, the body "
-            "falls at once; a shorter line cures it"
+            "open the spring to the atmosphere at one stroke: the body falls at once, the sensor has gone two "
+            "thirds of the way after {sensor_lag}; a shorter line cures it"
         ),
         mistaken_for={"valve_lag": "the body is late as well"},
     ),

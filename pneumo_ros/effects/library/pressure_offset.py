@@ -19,7 +19,7 @@ EFFECT = Effect(
     undo=unshifted,
     guide=Guide(
         meaning="A pressure sensor's zero is off.",
-        check="vent the spring: the sensor says {offset} more (less) than the barometer",
+        check="vent the spring: the sensor differs from the barometer by {offset}",
         mistaken_for={
             "pressure_scale": "vented, the sensor is right",
             "payload": "the scales under the axles agree with the rig file",

@@ -12,6 +12,7 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import RIG, Effect
+from pneumo_ros.effects.expected import SAG
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.hooks import Air
 from pneumo_ros.effects.parameters import EffectParameter
@@ -70,9 +71,11 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The supply's pressure falls while air is drawn: small tank, tired regulator, long hose.",
         check=(
-            "put a gauge at the manifold, open both inlets for 1 s: the pressure sags by {supply_resistance} of "
-            "flow and is back after about {supply_time_constant}"
+            "put a gauge at the manifold, open both inlets to 1 mm2 until the gauge stands still, then close "
+            "them: they drew 3.7 g/s together, so the gauge rises by {sag}, two thirds of that within "
+            "{supply_time_constant}"
         ),
+        expects={"sag": SAG},
         mistaken_for={"orifice_coefficient": "is there with small draws as well; droop grows with what both ends draw"},
     ),
 )

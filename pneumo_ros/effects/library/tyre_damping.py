@@ -37,8 +37,9 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The tyre takes energy by itself.",
         check=(
-            "fix the body, push the axle down on the tyre and let go: the hop dies within a few swings; "
-            "{tyre_damping} between axle and ground"
+            "fix the body, push the axle down on the tyre, let go and log its LVDT: of two swings a and b that "
+            "follow each other T apart, 2 m ln(a/b) / T is the strut's own damping (bushing_damping of the rig "
+            "file) plus {tyre_damping}; m is the axle's mass"
         ),
         mistaken_for={
             "viscous_damping": "is gone when the body moves with the axle",

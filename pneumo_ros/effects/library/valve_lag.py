@@ -34,8 +34,8 @@ EFFECT = Effect(
     guide=Guide(
         meaning="The valve's opening follows its command late, as a first or second order system.",
         check=(
-            "step one inlet open at rest and log the pressure at full rate: its rate reaches two thirds only "
-            "after {valve_lag}, in a bend, not at once"
+            "step one inlet open at rest and log the pressure at full rate: it starts to rise at once but slowly, "
+            "and rises at two thirds of its full rate {valve_lag} after the step"
         ),
         mistaken_for={
             "transport_delay": "nothing at all happens for a while, then the full rate",

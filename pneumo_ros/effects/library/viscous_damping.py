@@ -49,8 +49,9 @@ EFFECT = Effect(
             "The strut's damper, bushing or the air in a hose resists by speed, more or less than the rig file says."
         ),
         check=(
-            "vent the bellows, push the body down by 5 mm and let go: the free swing dies faster (slower) than "
-            "modelled; {added_damping} more resist a stroke of 1 m/s"
+            "close the valves at design height, push the body down by 5 mm over one axle, let go and log its "
+            "LVDT: of two swings a and b that follow each other T apart, 2 m ln(a/b) / T is bushing_damping of "
+            "the rig file plus {added_damping}; m is the mass that the strut carries"
         ),
         mistaken_for={
             "coulomb_friction": "does not fade with slow motion",

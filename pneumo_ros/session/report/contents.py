@@ -16,9 +16,11 @@ from pneumo_ros.log.inspection import Event, Report, Setup, TopicReport, inspect
 from pneumo_ros.session.passive import passive_session
 from pneumo_ros.session.picture import draw_session
 from pneumo_ros.session.summary import (
+    STEPS_NOTE,
     Recorded,
     Summary,
     change,
+    counts_missed,
     figures,
     load_session,
     loop_timing,
@@ -27,7 +29,7 @@ from pneumo_ros.session.summary import (
     summarise,
     wall_time,
 )
-from pneumo_ros.session.warnings import warnings_of
+from pneumo_ros.session.warnings import MISSED, of_the_session, warnings_of
 from pneumo_ros.units import SQUARE_INCH
 
 LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
@@ -62,7 +64,7 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "title": log.path.name,
         "facts": _facts(report),
         "ending": _ending(report),
-        "trips": [_event_row(event, report) for event in report.events if event.level >= 1],
+        "trips": [_event_row(event, report) for event in of_the_session(report.events) if event.level >= 1],
         "summary": summary_rows(ours, theirs),
         "has_passive": theirs is not None,
         "picture": _picture(session, passive, log.path.name),
@@ -70,7 +72,8 @@ def contents(log: Log, passive: Recorded | None = None) -> dict[str, Any]:
         "stretch": ours.stretch,
         "judged_by": ours.judged_by,
         "warnings": ours.warnings,
-        "waits": ours.mode == "lockstep",
+        "steps_note": STEPS_NOTE,
+        "misses": counts_missed(ours),
         "loop": loop_rows(ours),
         "topics": [topic_row(topic) for topic in report.topics],
         "events": [_event_row(event, report) for event in report.events],
@@ -108,9 +111,8 @@ def loop_rows(summary: Summary) -> list[Row]:
         if values.get("steps", "0") != "0":
             keys = [f"{label} {p} (us)" for label in ("period", "step") for p in ("p50", "p99", "max")]
             cells = [f"{float(values.get(key, 'nan')) / 1e3:.3g}" for key in keys]
-            rows.append(
-                (node, values["steps"], *cells, "" if summary.mode == "lockstep" else values.get("missed periods", ""))
-            )
+            missed = (values.get(MISSED, ""),) if counts_missed(summary) else ()
+            rows.append((node, values["steps"], *cells, *missed))
     return rows
 
 
@@ -120,7 +122,7 @@ def topic_row(topic: TopicReport) -> Row:
     if t is None:
         return (topic.name, topic.type, str(topic.count), "", "", "", "", "", "")
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
-    missing = f"{t.missing} in {len(t.gaps)} gaps, longest {t.gaps[0].length:.4g} s" if t.gaps else "0"
+    missing = t.gaps_in_words.replace(" samples missing", "").replace(" sample missing", "") or "0"
     delay = f"{t.delay_p50 * 1e3:.3g} / {t.delay_p99 * 1e3:.3g}"
     regular = [
         f"{one:.{digits}g}" if math.isfinite(one) else "" for one, digits in ((t.rate_hz, 6), (1e3 * t.jitter, 3))

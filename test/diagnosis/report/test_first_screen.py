@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from helpers.browser import browser
 from helpers.findings import LIBRARY, findings
 
+from pneumo_ros.cli.diagnosis_shown import show_budget
+from pneumo_ros.cli.terminal import Console
+from pneumo_ros.diagnosis.half_car.where import Law
 from pneumo_ros.diagnosis.report import render, write_report
 from pneumo_ros.diagnosis.report.facts import check
 from pneumo_ros.diagnosis.report.rig_map import colour
@@ -22,6 +27,7 @@ from pneumo_ros.diagnosis.report.words import (
     site_words,
     whole_percents,
 )
+from pneumo_ros.diagnosis.result import BudgetEntry
 
 
 def test_sites_of_any_rig_are_told_as_what_they_are() -> None:
@@ -36,10 +42,13 @@ def test_sites_of_any_rig_are_told_as_what_they_are() -> None:
 def test_a_law_of_another_kind_is_checked_against_its_measured_curve() -> None:
     """What a law's own number says little about, where its family's shape does most of it."""
     found = findings()
-    plain, other = (
-        check({**found.summary, "budget": [{"effects": ["leak"], "law": law}]}, LIBRARY) for law in ("leak", "differs")
+    plain, other, bare = (
+        check({**found.summary, "budget": [{"effects": ["leak"], "law": law, "curve": curve}]}, LIBRARY)
+        for law, curve in (("leak", None), ("differs", {"points": []}), ("differs", None))
     )
-    assert "0.41 mm2" in plain and "some mm2" in other and "measured curve" in other and "0.41" not in other
+    assert "0.41 mm2" in plain and "0.41" not in other + bare
+    assert "a hole of the leak area (mm2)" in other and other.endswith("; read the size off the curve in the report")
+    assert bare.endswith("; this log gives no number for it")  # a curve that is not there is not pointed at
 
 
 def test_a_law_of_another_kind_is_as_big_as_its_measured_curve() -> None:
@@ -102,6 +111,28 @@ def test_an_unknown_says_what_came_closest_and_why_it_was_not_taken() -> None:
     assert "force over height: -3 N at -10 mm, 5 N at 10 mm" in facts["measured"]
 
 
+def test_an_unknown_whose_closest_names_leave_nothing_shows_their_law_as_what_was_measured() -> None:
+    """Nothing is left to measure; which numbers stand at the ends of their ranges is told once, with their values."""
+    found = findings("unknown")
+    curve = {"x": {"name": "height", "unit": "m"}, "y": {"name": "force", "unit": "N"},
+             "points": [[-0.01, -3.0, -4.0, -2.0, 1.0], [0.01, 5.0, 4.0, 6.0, 1.0]]}  # fmt: skip
+    entry = {"effects": ["leak"], "family": "leak", "side": "front", "places": ["front_air"], "share": 0.3,
+             "share_ci90": [0.2, 0.4], "law": "differs", "probability": 0.45, "curve": curve}  # fmt: skip
+    best = found.summary["ranking"][0]
+    stuck = {"value": 2.0, "std": 0.03, "unit": "kg", "at_bound": True}
+    notes = ["hanging_mass ended at its bound", "scale below 1 moves no output", "unstable on the held-out log"]
+    ranking = [{**best, "parameters": {**best["parameters"], "mode.hanging_mass": stuck}, "notes": notes}]
+    summary = {**found.summary, "ranking": ranking, "budget": [entry], "remainder": {"share": 0.0, "places": []},
+               "evidence": {"closes:leak": 1.0, "effects": 1.0, "at_bounds:leak": 1.0}}  # fmt: skip
+    facts = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)
+    assert facts["not it"] == (
+        "hanging mass (2 kg) stops at an end of its range, where no part of a rig is likely to be; "
+        "unstable on the held-out log"
+    )
+    assert facts["measured"].startswith("at the front air and valve, with leak of any law in its place, force over h")
+    assert "No name was accepted." in render(replace(found, summary=summary))
+
+
 def test_an_unknown_that_rings_says_where_how_and_what_its_name_leaves() -> None:
     found = findings("unknown")
     points = [[1.0, 5.0, 4.0, 6.0, 0.3], [5.9, 62.0, 60.0, 64.0, 0.3], [40.0, 0.6, 0.5, 0.7, 0.3]]
@@ -119,7 +150,7 @@ def test_what_became_of_an_effect_of_ones_own_is_told() -> None:
                                                {"candidate": "mine:rear", "gap_fit": 0.2}]}  # fmt: skip
     fate = dict(story(summary, known).facts)["your effect"]
     assert "supply droop was fitted and closes 98 %" in fate and "leak is the verdict" in fate
-    assert "mine was fitted and is number 2 of 2: 0.2 left" in fate
+    assert "mine was fitted and came out number 2 of 2: it leaves a gap of 0.2 on the fitted logs" in fate
 
 
 def test_the_rigs_own_parameters_stand_beside_what_was_stated() -> None:
@@ -133,6 +164,7 @@ def test_the_rigs_own_parameters_stand_beside_what_was_stated() -> None:
 @pytest.mark.parametrize("shares", [[0.604, 0.404], [0.5, 0.5, 0.5], [1 / 3] * 3, [0.996, 0.004], [0.93]])
 def test_shares_add_up_to_at_most_a_hundred(shares: list[float]) -> None:
     whole = whole_percents(shares)
+    assert whole_percents([0.334584, 0.190833]) == [33, 19]  # each as it is rounded alone, on page and map alike
     assert sum(whole) <= 100 and all(
         abs(w - 100 * s / max(sum(shares), 1)) < 1 for w, s in zip(whole, shares, strict=True)
     )
@@ -164,6 +196,27 @@ def test_what_is_not_finite_is_told_too() -> None:
     }
     said = story({**findings().summary, "ranking": [loose]}, Known(LIBRARY))
     assert dict(said.facts)["how big"].startswith("no single number")
+
+
+def test_what_is_missing_is_drawn_once_for_two_places_in_one_balance() -> None:
+    x = np.linspace(-0.1, 0.1, 40)
+    laws = [Law(place, "front_axle", "spring velocity", "m/s", "N", x, x, x[::8], x[::8], 0.11)
+            for place in ("front_force", "road_input")]  # fmt: skip
+    page = render(replace(findings("unknown"), laws=laws))
+    assert page.count("What the re-estimated model misses at") == 1
+    assert "at the front spring force or the road input, seen in the balance of the front axle" in page
+
+
+@pytest.mark.parametrize(("verdict", "head"), [("unknown", "the closest names, none accepted"),
+                                               ("leak", "what makes the nominal model's gap")])  # fmt: skip
+def test_the_terminal_says_whether_the_names_of_the_budget_are_accepted(verdict: str, head: str) -> None:
+    entry = BudgetEntry(("leak",), "front", ("front_air",), 0.3, (0.2, 0.4), "leak", 0.45)
+    found = findings(verdict)
+    summary = {**found.summary, "budget": [entry.to_json()], "refit_share": 0.7, "remainder": None, "floor_share": 0.0}
+    console = Console(width=80, record=True, file=io.StringIO())
+    show_budget(console, summary, verdict)
+    said = console.export_text()
+    assert head in said and ("0.45" in said) == (verdict == "leak"), said
 
 
 @pytest.mark.parametrize("width", [390, 1280])

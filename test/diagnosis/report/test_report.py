@@ -142,8 +142,10 @@ def test_every_verdict_says_what_to_do_next() -> None:
     page = render(replace(found, asked=asked))
     assert escape(second.text) in re.sub("</?span[^>]*>", "", page) and diagnosed in unescape(page)
     assert '<span class="option">--rig</span>' in page  # not broken over two lines
+    assert "Only a session of the rig that made the logs tells" in first.text  # they do not say which one it was
     bench = Asked((Path("a.mcap"),), rig_options=("--source", "serial", "--port", "/dev/ttyACM0"))
     assert next_steps(found.summary, bench)[0].commands[0].startswith("pneumo run --source serial --port /dev/ttyACM0 ")
+    assert "--source serial" not in next_steps(found.summary, bench)[0].text
     clear = {**found.summary, "next_experiment": None}
     assert "--source serial" in next_steps({**clear, "verdict": "unknown"}, bench)[0].commands[0]
     assert [len(next_steps({**clear, "verdict": verdict})) for verdict in ("none", "unknown", "leak")] == [1, 2, 1]
