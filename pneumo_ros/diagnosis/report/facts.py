@@ -214,11 +214,15 @@ def why_not(summary: Mapping[str, Any]) -> str:
             where = " and ".join(place_words(place) for place in (summary.get("remainder") or {}).get("places", ()))
             reasons.append(f"whatever may act at {where or 'another place'} in place of {effect_name(effect)} leaves "
                            f"{percent(instead)} of what it leaves")  # fmt: skip
+        if float(evidence.get(f"unheld:{effect}", 0.0)) >= limits.unheld[1]:
+            reasons.append(f"the rig's equations along the log hold no better with {effect_name(effect)} than without")
         bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
         if bounded >= limits.at_bounds and not stopped:
             reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
         if float(evidence.get(f"follows:{effect}", 1.0)) < 1.0:
             reasons.append("the reading stops at an end of its range, as that of a sensor at its limit does")
+    if float(evidence.get("kept_chosen", 0.0)) >= limits.kept:
+        reasons.append("the best structure leaves most of what the rig's equations along the log miss, or adds to it")
     if float(entry["shrink"]) <= 0.0:
         reasons.append("it does not shrink the held-out gap")
     if float(evidence.get("effects") or 0.0) == 0.0:

@@ -144,6 +144,17 @@ def test_an_unknown_that_rings_says_where_how_and_what_its_name_leaves() -> None
     assert "apparent mass over frequency: 5 kg at 1 Hz, at most 62 kg at 5.9 Hz" in facts["measured"]
 
 
+def test_an_unknown_says_that_the_equations_hold_no_better() -> None:
+    found = findings("unknown")
+    summary = {**found.summary, "evidence": {"closes:leak": 1.0, "unheld:leak": 1.02, "kept_chosen": 1.3}}
+    said = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)["not it"]
+    assert "the rig's equations along the log hold no better with leak than without" in said
+    assert "the best structure leaves most of what the rig's equations along the log miss, or adds to it" in said
+    summary = {**found.summary, "evidence": {"closes:leak": 1.0, "unheld:leak": 0.1, "kept_chosen": 0.1}}
+    said = dict(story(summary, Known(LIBRARY, gains(found.holdout, found.trajectories))).facts)["not it"]
+    assert "equations" not in said
+
+
 def test_what_became_of_an_effect_of_ones_own_is_told() -> None:
     known = Known(LIBRARY, own=("supply_droop", "mine", "leak"))
     summary = {**findings().summary, "tried": [{"candidate": "leak:front", "gap_fit": 0.01},
