@@ -222,14 +222,14 @@ def gained(poorer: Scored, richer: Scored) -> float:
     """Fall of log mean square that a further effect brings, against a threshold for :func:`advantage`.
 
     For a second effect that of the kept blocks alone: the misfit of a first one's law is all that it might serve. For
-    those after it the mean of fitted and kept samples, as :func:`log_weight` counts them, and at most twice that of the
-    kept ones: where several laws leave their misfits, some blocks hardly show one effect more.
+    those after it also the mean of fitted and kept samples, as :func:`log_weight` counts them, but at most twice that of
+    the kept ones: where several laws leave their misfits, some blocks hardly show one effect more.
     """
     kept = advantage(poorer, richer)
     if richer.size < THIRD:
         return kept
     fitted = float(np.log((FORM + poorer.fitted) / (FORM + richer.fitted)))
-    return min(0.5 * (kept + fitted), 2.0 * kept)
+    return max(kept, min(0.5 * (kept + fitted), 2.0 * kept))
 
 
 def standard_error(one: Scored, other: Scored) -> float:
