@@ -222,8 +222,8 @@ def gained(poorer: Scored, richer: Scored) -> float:
     """Fall of log mean square that a further effect brings, against a threshold for :func:`advantage`.
 
     For a second effect that of the kept blocks alone: the misfit of a first one's law is all that it might serve. For
-    those after it also the mean of fitted and kept samples, as :func:`log_weight` counts them, but at most twice that of
-    the kept ones: where several laws leave their misfits, some blocks hardly show one effect more.
+    those after it also the mean of fitted and kept samples, as in :func:`log_weight`, at most twice that of the kept
+    ones: where several laws leave their misfits, some blocks hardly show one effect more.
     """
     kept = advantage(poorer, richer)
     if richer.size < THIRD:
