@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -30,6 +30,7 @@ from pneumo_ros.dashboard.pace import Pace
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
 from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, wrapping
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
+from pneumo_ros.log.inspection import Event
 from pneumo_ros.printable import one_line
 
 REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
@@ -38,6 +39,7 @@ POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
 WIDGET = 330  # px; the longest name of a parameter with its unit and range fits above its field
 EVENTS_SHOWN = 200
+TRIPPED = 2  # level of an event from which it is a trip
 ANSWERS_SHOWN = 6
 # Said when the picture is on the screen: what a browser has drawn is a frame and a turn of its loop later.
 DRAWN = "const n = cb_obj.text; requestAnimationFrame(() => setTimeout(() => { echo.text = n; }, 0));"
@@ -242,7 +244,7 @@ class Page:
             return
         # An event may be heard before the first sample, whose stamp its time is told from.
         self._shown_events = (len(events), start_ns)
-        newest = list(events)[: -EVENTS_SHOWN - 1 : -1]
+        newest = trips_first(events)
         self._events.data = {
             "time": [f"{max(e.time_ns - start_ns, 0) * 1e-9:.3f}" if start_ns else "" for e in newest],
             "level": [_LEVELS.get(e.level, str(e.level)) for e in newest],
@@ -257,6 +259,13 @@ class Page:
         if new:
             self._said = [*self._said, *new][-ANSWERS_SHOWN:]
             self._answers.text = "<br>".join(_shown(line) for line in self._said)
+
+
+def trips_first(events: Sequence[Event]) -> list[Event]:
+    """The newest first, and above all others the trips: late estimates come by the hundred."""
+    newest = list(events)[::-1]
+    trips = [event for event in newest if event.level >= TRIPPED]
+    return [*trips, *(event for event in newest if event.level < TRIPPED)][:EVENTS_SHOWN]
 
 
 def _control_words(control: Control) -> str:

@@ -175,6 +175,22 @@ def test_times_of_events_count_from_the_first_sample_as_soon_as_it_is_known(log_
     assert table.data["time"] == ["2.000"]
 
 
+class Tripped(Playback):
+    """A session that tripped early and then went on with hundreds of late estimates."""
+
+    def events(self) -> list[Event]:
+        late = [Event(self.start_ns + k * 10**7, 1, "controller", "estimate_stale", "late", {}) for k in range(2, 500)]
+        return [Event(self.start_ns + 10**7, 2, "plant", "estop", "emergency stop: valves closed", {}), *late]
+
+
+def test_a_trip_stands_above_hundreds_of_warnings_that_came_later(log_path: Path) -> None:
+    document = Document()
+    Page(document, Tripped(read_log(log_path)))
+    data = next(iter(document.select({"name": "events"}))).source.data
+    assert data["code"][:3] == ["estop", "estimate_stale", "estimate_stale"] and data["level"][0] == "error"
+    assert data["time"][1] == "4.990" and len(data["code"]) == 200  # of the others the newest first
+
+
 def fetch(url: str, **headers: str) -> int:
     try:
         with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=20) as answer:
