@@ -15,7 +15,6 @@ from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
 from pneumo_ros.diagnosis.fit.shooting import Piece
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
-from pneumo_ros.diagnosis.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group
 from pneumo_ros.diagnosis.judge.budget import budget
 from pneumo_ros.diagnosis.judge.budgeted import budgeted
@@ -24,6 +23,7 @@ from pneumo_ros.diagnosis.judge.effect_shares import effect_shares
 from pneumo_ros.diagnosis.judge.equations import Equations
 from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor, total_gap
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
+from pneumo_ros.diagnosis.judge.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of

@@ -8,7 +8,7 @@ from helpers.own_logs import log
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
-from pneumo_ros.diagnosis.idle_shapes import with_own_laws
+from pneumo_ros.diagnosis.judge.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
