@@ -51,7 +51,9 @@ def evidence_of(entry: dict[str, Any], found: dict[str, Any]) -> EffectEvidence:
     # Any three gaps with the share that was closed will do.
     share = entry["share"] * gap["nominal"] ** 2 / left
     bounds = float(found["evidence"].get(f"at_bounds:{entry['effects'][0]}", 0.0))
-    return EffectEvidence((entry["effects"][0], ""), (), 1.0, (1.0 - closes) ** 2, 0.0, share, bounds)
+    return EffectEvidence(
+        (entry["effects"][0], ""), tuple(entry["places"]) or ("",), 1.0, (1.0 - closes) ** 2, 0.0, share, bounds
+    )
 
 
 def report(found: list[tuple[dict[str, Any], dict[str, Any], bool]]) -> None:

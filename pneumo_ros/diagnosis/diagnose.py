@@ -25,13 +25,16 @@ from pneumo_ros.diagnosis.judge.held_out import noise_floor, settle, total_floor
 from pneumo_ros.diagnosis.judge.held_out_runs import HeldOut, edit_test, held_runs
 from pneumo_ros.diagnosis.judge.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
+from pneumo_ros.diagnosis.judge.pruning import harmful
 from pneumo_ros.diagnosis.judge.ranking import rank
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.result import Diagnosis, Gap
 from pneumo_ros.diagnosis.search.competition import compete
+from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.parts import reduced
 from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.diagnosis.traits import HasLimits
@@ -135,6 +138,7 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
     finalists = tuple(score(problem, f) for f in search.finalists)
     everything = np.ones(len(problem.measured), dtype=bool)
     base = _final(problem, search.refit, everything)
+    equations = None if options.equations is None else options.equations(problem.model, problem.records, holdout)
     while True:
         chosen = select(refit, finalists, options.limits)
         best = base if chosen.size == 0 else _final(problem, chosen.fit, everything)
@@ -143,6 +147,13 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
             break
         # What runs away from another start is no model of the rig, however well it fits one log.
         finalists = tuple(one for one in finalists if one is not chosen)
+    gone = harmful(problem, best, holdout, equations) if chosen.size > 1 else ()
+    if gone:
+        parts = [part for law in gone for part in of_law(chosen.fit.candidate, law)]
+        pruned = score(problem, reduced(problem, chosen.fit, parts))
+        finalists = (*(one for one in finalists if one is not chosen), pruned)
+        chosen, best = pruned, _final(problem, pruned.fit, everything)
+        runs = held_runs(problem, base, best, holdout)
     tell(0.93, "locating")
     floor = total_floor(holdout)
     shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
@@ -151,8 +162,7 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
     tell(0.94, "what else could be closed")
     rest = after if after is not None else before
     likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
-    held = None if options.equations is None else options.equations(problem.model, problem.records, holdout)
-    beside = closable(problem, best, holdout, floor, runs["refit"].total, likely, held)
+    beside = closable(problem, best, holdout, floor, runs["refit"].total, likely, equations)
     return replace(found, closable=beside, before=before, after=after)
 
 

@@ -76,7 +76,7 @@ class Calibration:
     slight: float = 0.12
     beside: float = 0.2
     instead: float = 2.0
-    kept: float = 0.7
+    kept: float = 0.8
     unheld: tuple[float, float] = (0.8, 0.95)
     traces: float = 0.4
     held_real: float = 3.0

@@ -60,12 +60,13 @@ def test_a_wrong_name_does_not_act_in_the_equations_and_the_right_one_does(model
 
 
 def test_it_is_what_the_search_for_places_calls_the_refit(model: RigModel) -> None:
-    fit_log, held = rig_with(model, Active("viscous_damping", "both", (40.0,)))
+    damped = Active("viscous_damping", "both", (40.0, 0.0))
+    fit_log, held = rig_with(model, damped)
     nuisance = np.array([p.nominal for p in model.parameters])
     there = held_equations(model, (fit_log,), held).left(nuisance, ())
     assert there == pytest.approx(locate(model, (fit_log,), held).level["refit"] ** 2, rel=0.02)
     assert there > 2.0
-    assert held_equations(model, (fit_log,), held).left(nuisance, (Active("viscous_damping", "both", (40.0,)),)) < 1.2
+    assert held_equations(model, (fit_log,), held).left(nuisance, (damped,)) < 1.2
 
 
 def test_a_gap_that_the_equations_hardly_show_is_no_reference() -> None:
