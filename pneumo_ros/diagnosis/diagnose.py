@@ -283,7 +283,8 @@ def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts |
 
 
 def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
-    """A named effect's own places; else the places where a flexible correction of the nominal model helps.
+    """A named effect's own places; else those where something in a name's stead left less, before the places where a
+    flexible correction of the nominal model helps.
 
     Not of the best named structure: a wrong name has changed the model where it acts.
     """
@@ -292,8 +293,12 @@ def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
         initial = settle(model, holdout, outcome.nuisance, outcome.active)
         closed = max(0.0, 1.0 - runs["best"].total / runs["refit"].total)
         return effect_shares(model, holdout, outcome.nuisance, initial, outcome.active, closed)
-    before = outcome.before
-    return [] if before is None else [(place, float(np.clip(share, 0.0, 1.0))) for place, share in before.shares]
+    before = () if outcome.before is None else outcome.before.shares
+    floor = total_floor(holdout)
+    first = outcome.closable.in_stead(runs["refit"].total ** 2 - floor**2)
+    left = 1.0 - sum(share for _, share in first)
+    known = dict(first)
+    return [*first, *((p, left * float(np.clip(share, 0.0, 1.0))) for p, share in before if p not in known)]
 
 
 def _evidence(outcome: Outcome) -> dict[str, float]:

@@ -135,6 +135,18 @@ class Closable:
     remainders: tuple[Remainder, ...]
     own: float = 0.0
 
+    def in_stead(self, refit: float) -> list[tuple[str, float]]:
+        """Places where something in an effect's stead leaves less than the structure does, each with its share of what
+        it closes; empty where nothing does.
+
+        ``refit`` : held-out gap that the refit leaves, mean square above the floor
+        """
+        if not self.remainders or not any(one.instead < 1.0 for one in self.effects):
+            return []
+        rest = self.remainders[0]
+        closed = float(np.clip(1.0 - rest.gap / max(refit, 1e-12), 0.0, 1.0))
+        return [(place, closed / len(rest.places)) for place in rest.places]
+
 
 def closable(
     problem: Problem,

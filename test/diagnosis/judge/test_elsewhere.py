@@ -63,12 +63,14 @@ def test_what_rings_elsewhere_takes_the_name(model: RigModel, truth: Active, pla
     assert likely(found) < 0.05
     rest = found.remainders[0]
     assert rest.fit.candidate.parts == rest.parts  # in its place, not beside it
+    assert found.in_stead(4.0 * rest.gap) == [(place, pytest.approx(0.75))]
 
 
 @pytest.mark.slow
 def test_a_resonance_of_the_bellows_keeps_its_name(model: RigModel) -> None:
     found = called(model, Active("bellows_mode", "both", (0.4, FREQUENCY, 0.08, 0.5)), (BELLOWS,), RESONANCE)
     assert likely(found) > 0.9
+    assert found.in_stead(1.0) == []
 
 
 def icing(model: RigModel, share: float) -> tuple[float, ...]:
