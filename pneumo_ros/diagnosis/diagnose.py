@@ -11,7 +11,7 @@ import numpy as np
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.experiment import NextExperiment
-from pneumo_ros.diagnosis.fit.problem import Problem, stated_form
+from pneumo_ros.diagnosis.fit.problem import Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.shooting import Piece
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, sensitivities
 from pneumo_ros.diagnosis.fit.uncertainty import covariance, nuisance_estimates
@@ -35,7 +35,7 @@ from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.parts import reduced
-from pneumo_ros.diagnosis.search.selection import Thresholds, null_thresholds, score, select
+from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
 from pneumo_ros.diagnosis.traits import HasLimits
 from pneumo_ros.effects.parameters import Active
@@ -147,13 +147,13 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
             break
         # What runs away from another start is no model of the rig, however well it fits one log.
         finalists = tuple(one for one in finalists if one is not chosen)
-    gone = harmful(problem, best, holdout, equations) if chosen.size > 1 else ()
-    if gone:
-        parts = [part for law in gone for part in of_law(chosen.fit.candidate, law)]
-        pruned = score(problem, reduced(problem, chosen.fit, parts))
-        finalists = (*(one for one in finalists if one is not chosen), pruned)
-        chosen, best = pruned, _final(problem, pruned.fit, everything)
-        runs = held_runs(problem, base, best, holdout)
+    pruned = _without_harm(problem, chosen, harmful(problem, best, holdout, equations))
+    if pruned is not chosen:
+        again = _final(problem, pruned.fit, everything)
+        left = held_runs(problem, base, again, holdout)
+        if np.all(np.isfinite(left["best"].predicted)):
+            finalists = (*(one for one in finalists if one is not chosen), pruned)
+            chosen, best, runs = pruned, again, left
     tell(0.93, "locating")
     floor = total_floor(holdout)
     shares = budget(problem, best, holdout, floor, runs["nominal"].total, runs["refit"].total)
@@ -164,6 +164,12 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
     likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
     beside = closable(problem, best, holdout, floor, runs["refit"].total, likely, equations)
     return replace(found, closable=beside, before=before, after=after)
+
+
+def _without_harm(problem: Problem, chosen: Scored, gone: Sequence[Part]) -> Scored:
+    """The chosen structure without some of its laws, scored; itself where none goes."""
+    parts = [part for law in gone for part in of_law(chosen.fit.candidate, law)]
+    return score(problem, reduced(problem, chosen.fit, parts)) if parts else chosen
 
 
 def _weighed(outcome: Outcome) -> tuple[EffectEvidence, ...]:

@@ -18,9 +18,8 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
-from pneumo_ros.diagnosis.judge.pruning import left_in
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
@@ -182,14 +181,14 @@ def closable(
     elsewhere = exchanges({law: _elsewhere(problem, law, much) for law in best.candidate.laws})
     instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
 
-    moved = 0.0 if equations is None else left_in(equations, problem, best)
+    still = 0.0 if equations is None else left_in(equations, problem, best)
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
         without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
-        missing = None if equations is None else (moved, left_in(equations, problem, bare))
+        missing = None if equations is None else (still, left_in(equations, problem, bare))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,

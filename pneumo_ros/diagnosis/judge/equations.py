@@ -11,6 +11,8 @@ from collections.abc import Callable
 from typing import Final
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.effects.parameters import Active
 
 # (nuisance values, effects) -> mean square that they leave in the equations along the held-out log, null variances
@@ -28,3 +30,8 @@ def kept(left: float, before: float) -> float:
     A gap that the equations hardly show counts as :data:`SHOWN`. Both mean squares in null variances.
     """
     return max(left - EXPLAINED, 0.0) / max(before - EXPLAINED, SHOWN)
+
+
+def left_in(equations: Equations, problem: Problem, one: Fit) -> float:
+    """Mean square that a structure leaves in the equations, null variances."""
+    return equations(problem.nuisance(one.x), problem.active(one.candidate, problem.values(one.candidate, one.x)))

@@ -14,6 +14,7 @@ from typing import Final
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.result import DIFFERS, BudgetEntry
+from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.effects.parameters import Active, family_of
 
 # Of their typical values: shapes whose sizes all stay below do nothing that is worth a word. That of a pure delay ended
@@ -29,7 +30,7 @@ def with_own_laws(problem: Problem, best: Fit, entries: Sequence[BudgetEntry]) -
 
     def told(entry: BudgetEntry) -> BudgetEntry:
         law = laws[entry.effects[0], entry.side, entry.places]
-        shapes = [part for part in best.candidate.shapes if _beside(part, law)]
+        shapes = [part for part in of_law(best.candidate, law) if part in best.candidate.shapes]
         idle = all(_idle(problem, part, values[part]) for part in shapes)
         return replace(entry, law=law[0]) if entry.law == DIFFERS and idle else entry
 
@@ -39,10 +40,6 @@ def with_own_laws(problem: Problem, best: Fit, entries: Sequence[BudgetEntry]) -
 def _key(problem: Problem, law: Part) -> tuple[str, str | None, tuple[str, ...]]:
     acting = Active(*law, ())
     return family_of(law[0]), problem.model.side(acting), tuple(problem.model.places(acting))
-
-
-def _beside(part: Part, law: Part) -> bool:
-    return family_of(part[0]) == family_of(law[0]) and part[1] == law[1]
 
 
 def _idle(problem: Problem, part: Part, values: Sequence[float]) -> bool:

@@ -16,14 +16,14 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, SHOWN, Equations
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, SHOWN, Equations, left_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced
-from pneumo_ros.effects.parameters import Active
 
-# Times as much (rms) that a structure leaves with an effect as without it, from which on the effect does harm [taste]
+# Times as much (rms) that a structure leaves with an effect as without it, from which on the effect does harm
+# [calibration: set 0.5, opened]
 HARM: Final = 1.25
 STEPS: Final = 4  # iterations of a fit with an effect taken away [numerics]
 
@@ -41,8 +41,10 @@ def harmful(problem: Problem, best: Fit, holdout: Record, equations: Equations |
     """
 
     def left(one: Fit) -> tuple[float, float]:
-        """Rms gap of the free run, and of the equations where they show any."""
-        gap = held_by(problem, one, holdout).total if not one.diverged else np.inf
+        """Gap of the free run, rms, and what the equations miss; without end where the run has none."""
+        gap = np.inf if one.diverged else held_by(problem, one, holdout).total
+        if not np.isfinite(gap):
+            return np.inf, np.inf
         return gap, 0.0 if equations is None else left_in(equations, problem, one)
 
     gone: list[Part] = []
@@ -67,9 +69,3 @@ def harm(own: tuple[float, float], bare: tuple[float, float]) -> float:
     """Times as much (rms) that is left with an effect as without it, of the gap or of the equations, the larger."""
     shown = own[1] > EXPLAINED + SHOWN
     return max(own[0] / max(bare[0], 1e-12), float(np.sqrt(own[1] / max(bare[1], EXPLAINED))) if shown else 0.0)
-
-
-def left_in(equations: Equations, problem: Problem, one: Fit) -> float:
-    """Mean square that a structure leaves in the equations, null variances."""
-    active: tuple[Active, ...] = tuple(problem.active(one.candidate, problem.values(one.candidate, one.x)))
-    return equations(problem.nuisance(one.x), active)
