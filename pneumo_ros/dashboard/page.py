@@ -39,7 +39,6 @@ POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
 WIDGET = 330  # px; the longest name of a parameter with its unit and range fits above its field
 EVENTS_SHOWN = 200
-TRIPPED = 2  # level of an event from which it is a trip
 ANSWERS_SHOWN = 6
 # Said when the picture is on the screen: what a browser has drawn is a frame and a turn of its loop later.
 DRAWN = "const n = cb_obj.text; requestAnimationFrame(() => setTimeout(() => { echo.text = n; }, 0));"
@@ -264,8 +263,8 @@ class Page:
 def trips_first(events: Sequence[Event]) -> list[Event]:
     """The newest first, and above all others the trips: late estimates come by the hundred."""
     newest = list(events)[::-1]
-    trips = [event for event in newest if event.level >= TRIPPED]
-    return [*trips, *(event for event in newest if event.level < TRIPPED)][:EVENTS_SHOWN]
+    trips = [event for event in newest if event.is_trip]
+    return [*trips, *(event for event in newest if not event.is_trip)][:EVENTS_SHOWN]
 
 
 def _control_words(control: Control) -> str:

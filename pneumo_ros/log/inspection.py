@@ -68,11 +68,16 @@ class Timing:
     @property
     def gaps_in_words(self) -> str:
         """``17 samples missing in 16 gaps, the longest 0.006 s``; '' where none is missing."""
+        samples = f"{self.missing} sample" + ("s" if self.missing != 1 else "")
+        return f"{samples} missing {self.where_missing}" if self.gaps else ""
+
+    @property
+    def where_missing(self) -> str:
+        """``in 16 gaps, the longest 0.006 s``; '' where none is missing."""
         if not self.gaps:
             return ""
-        samples, gaps = (f"{n} {word}" + ("s" if n != 1 else "")
-                         for n, word in ((self.missing, "sample"), (len(self.gaps), "gap")))  # fmt: skip
-        return f"{samples} missing in {gaps}, the longest {self.gaps[0].length:.4g} s"
+        gaps = f"{len(self.gaps)} gap" + ("s" if len(self.gaps) != 1 else "")
+        return f"in {gaps}, the longest {self.gaps[0].length:.4g} s"
 
 
 @dataclass(frozen=True)
@@ -104,6 +109,11 @@ class Event:
     message: str
     values: dict[str, str]
     stamp_ns: int = 0
+
+    @property
+    def is_trip(self) -> bool:
+        """Whether something was stopped by it: an error or worse, by the levels of diagnostic_msgs."""
+        return self.level >= 2
 
 
 @dataclass(frozen=True)

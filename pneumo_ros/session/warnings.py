@@ -11,7 +11,7 @@ from pneumo_ros.log.decoded import Log
 from pneumo_ros.log.inspection import Event, read_events
 
 MISSED = "missed periods"
-STALE, COMPLETE, TRIPPED = "estimate_stale", "session_complete", 2
+STALE, COMPLETE = "estimate_stale", "session_complete"
 REFUSED = {  # node and key of its /diagnostics -> what it means
     ("controller", "refused commands"): "commands were not finite, so the valves were held at trim",
     ("daq", "refused commands"): "commands were refused by the driver (too old, or out of range)",
@@ -40,7 +40,7 @@ def warnings_of(log: Log, loop: Mapping[str, Mapping[str, str]], mode: str) -> t
         count = int(float(loop.get(node, {}).get(key, "0")))
         if count:
             found.append(f"{count} {meaning}" if count > 1 else f"1 {_one(meaning)}")
-    trips = Counter(event.message for event in events if event.level >= TRIPPED)
+    trips = Counter(event.message for event in events if event.is_trip)
     return (*found, *(f"error: {text}" + (f" ({n} times)" if n > 1 else "") for text, n in trips.items()))
 
 

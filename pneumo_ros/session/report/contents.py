@@ -122,7 +122,7 @@ def topic_row(topic: TopicReport) -> Row:
     if t is None:
         return (topic.name, topic.type, str(topic.count), "", "", "", "", "", "")
     clock = [f"{n} {word}" for n, word in ((t.backward, "back"), (t.repeated, "equal"), (t.jumps, "set")) if n]
-    missing = t.gaps_in_words.replace(" samples missing", "").replace(" sample missing", "") or "0"
+    missing = f"{t.missing} {t.where_missing}" if t.gaps else "0"
     delay = f"{t.delay_p50 * 1e3:.3g} / {t.delay_p99 * 1e3:.3g}"
     regular = [
         f"{one:.{digits}g}" if math.isfinite(one) else "" for one, digits in ((t.rate_hz, 6), (1e3 * t.jitter, 3))
