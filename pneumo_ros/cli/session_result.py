@@ -32,9 +32,9 @@ class Wanted(NamedTuple):
 
 def report_unless_asked_to_end(console: Console, target: Path, values: Values, wanted: Wanted, code: int) -> None:
     """The session and its log are done; who asks again to end gets no report, and the session's own exit ``code``."""
-    for number in ENDING:
-        signal.signal(number, interrupt)
     try:
+        for number in ENDING:  # from the first one on an end may be asked for
+            signal.signal(number, interrupt)
         _report(console, target, values, wanted)
     except Interrupted:
         _hear_no_more()
