@@ -37,6 +37,7 @@ from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.parts import reduced
 from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
+from pneumo_ros.diagnosis.search.tightened import search_tightened
 from pneumo_ros.diagnosis.traits import HasLimits
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
@@ -103,6 +104,8 @@ def diagnose(
     tell = progress or (lambda share, what: None)
     search = compete(Problem(model, tuple(fit_logs), threads=options.threads), options.effort, options.pairs, tell)
     grow(search, options.limits, options.pairs)
+    if options.pairs:
+        search_tightened(search, options.limits)
     tell(0.9, "selecting and checking on the held-out log")
     outcome = _outcome(search, holdout, options, tell)
     held, evidence = _on_held_out(outcome), _weighed(outcome)

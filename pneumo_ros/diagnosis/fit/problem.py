@@ -71,6 +71,7 @@ class Problem:
     own_average : log samples in one fit sample; None: what the logs' own pace says
     fold : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
+    tightness : times the weight that the tolerances of the nuisance parameters are told to have
     """
 
     model: Model
@@ -78,6 +79,7 @@ class Problem:
     own_average: int | None = None
     fold: int = SELECT_EVERY - 1
     threads: int = 1
+    tightness: float = 1.0
 
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
         """``work`` done on each item, in their order, several at a time."""
@@ -221,9 +223,11 @@ class Problem:
         return np.concatenate([-reach, -free, low]), np.concatenate([reach, free, high])
 
     def prior(self, candidate: Candidate) -> Array:
-        """Inverse variance of each scaled unknown: nuisance and initial state one, effects that of their spread."""
+        """Inverse variance of each scaled unknown: nuisance and initial state one (the former times :attr:`tightness`),
+        effects that of their spread."""
         own = [1.0 / p.spread**2 for p in self.effect_parameters(candidate)]
-        return np.concatenate([np.ones(self.fixed), own])
+        count = len(self.model.parameters)
+        return np.concatenate([np.full(count, self.tightness), np.ones(self.fixed - count), own])
 
     def start(self, candidate: Candidate, fixed: Array | None, values: Sequence[float]) -> Array:
         """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A second search with the tolerances held tightly, where the first one's structure strains them.
+
+While an effect is missing the tolerances answer for it as far as they reach, most of them to their bounds: a load hides
+in masses and areas, and what the search then adds closes what these have left. With its tolerances near their nominal
+values a rig shows such an effect; what is found so is fitted once more with the tolerances as they are told and
+competes with the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
+from pneumo_ros.diagnosis.search.competition import compete, room_for_more
+from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort, Search
+
+# Mean square of the tolerances, prior sigmas, from which on a structure strains them; one is as told [taste]
+STRAINED: Final = 1.5
+TIGHTNESS: Final = 10.0  # times the weight that the tolerances have in the second search [taste]
+# Less than a first search needs: that one has seen what needs no tight tolerances [numerics]
+EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair_finalists=2, probes=8, exchanged=3)
+
+
+def search_tightened(search: Search, limits: Thresholds) -> None:
+    """Add to ``search.structures`` what a search with tight tolerances finds, fitted with the tolerances as told.
+
+    Nothing where the best structure leaves its tolerances alone, or leaves nothing to find.
+    """
+    problem = search.problem
+    finalists = [score(problem, one) for one in search.finalists]
+    best = select(score(problem, search.refit), finalists, limits)
+    if not best.size or best.stretch < STRAINED * len(problem.model.parameters) or not room_for_more(search):
+        return
+
+    def told(_: float, what: str) -> None:
+        search.progress(0.89, f"tolerances held tightly: {what}")
+
+    tight = replace(search.logged, fold=problem.fold, tightness=TIGHTNESS)
+    other = compete(tight, EFFORT, True, told)
+    grow(other, limits)
+
+    def released(one: Fit) -> Fit:
+        return fit(problem, one.candidate, one.x, iterations=search.effort.long)
+
+    found = problem.each(released, [one for one in other.finalists if one.candidate.laws])
+    search.structures += [one for one in found if not one.diverged]
