@@ -56,7 +56,7 @@ class Planned:
 
 def case_prefix(name: str) -> str:
     """What the names of a set's cases begin with: those of a full set are ``full-001`` and on, in its own folder."""
-    return "full" if name in ("full-0.3", "full-0.4") else name  # the sets before kept their numbers
+    return "full" if name in ("full-0.3", "full-0.4", "full-0.5") else name  # the sets before kept their numbers
 
 
 def drawn_side(name: str, rng: np.random.Generator) -> str | None:
