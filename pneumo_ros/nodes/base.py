@@ -37,6 +37,7 @@ from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
 from pneumo_ros.nodes.delivery import DELIVERY_PATIENCE, delivered
 from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.interfaces import message_class
+from pneumo_ros.nodes.parcels import Parcels
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
 from pneumo_ros.nodes.sources import NAMING, SoleSource
@@ -135,6 +136,8 @@ class RigNode(Node):
         self.sources: list[SoleSource] = []
         self._outgoing: list[tuple[Topic, Publisher]] = []
         self._logged: dict[str, float] = {}
+        apart = self.lockstep and self.hand_over is None and self.values["session_id"]
+        self.parcels = Parcels(self) if apart else None
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -210,20 +213,24 @@ class RigNode(Node):
         """A timer on a steady clock: simulated time may stand still, waiting and watching must not."""
         return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def publisher(self, topic: Topic) -> Publisher:
-        """Create the publisher of a topic of the table."""
-        return self._publisher(topic)
-
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
-        """Create the publisher of a topic of the table; what sends serialised bytes with it, or hands them over."""
-        if self.hand_over is None or not self.hand_over.covers(topic):
-            send: Callable[[bytes], None] = self._publisher(topic).handle.publish_raw
-            return send
-        outlet = self.hand_over.outlet(topic)
-        outlet.attach(self._publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
-        return outlet.publish
+        """Create the publisher of a topic of the table; what sends serialised bytes with it, or in a shorter way."""
+        if self.hand_over is not None and self.hand_over.covers(topic):
+            outlet = self.hand_over.outlet(topic)
+            outlet.attach(self.publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
+            return outlet.publish
+        if self.parcels is not None and self.parcels.covers(topic):
+            return self.parcels.sender(topic)
+        send: Callable[[bytes], None] = self.publisher(topic).handle.publish_raw
+        return send
 
-    def _publisher(self, topic: Topic, **options: Any) -> Publisher:
+    def send_off(self) -> None:
+        """Said is what the next nodes wait for: where it goes in a parcel, that leaves now."""
+        if self.parcels is not None:
+            self.parcels.send_next()
+
+    def publisher(self, topic: Topic, **options: Any) -> Publisher:
+        """Create the publisher of a topic of the table; ``options`` as of :meth:`create_publisher`."""
         qos = publisher_qos(topic.flow, self.lockstep)
         made = self.create_publisher(message_class(topic.type), topic.relative, qos, **options)
         self._outgoing.append((topic, made))
@@ -232,8 +239,9 @@ class RigNode(Node):
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: QoSProfile | None = None) -> SoleSource:
         """Receive a topic of the table, from its one publisher, as serialised bytes."""
         source = SoleSource(self, topic, self.on_other_publisher)
+        qos = qos or subscriber_qos(topic.flow, self.lockstep)
         made = self.create_subscription(
-            message_class(topic.type), topic.relative, callback, qos or subscriber_qos(topic.flow, self.lockstep),
+            message_class(topic.type), topic.relative, callback, qos,
             event_callbacks=source.callbacks() if topic.publisher else None, raw=True,
         )  # fmt: skip
         source.attach(made)
@@ -241,6 +249,9 @@ class RigNode(Node):
         if self.hand_over is not None and self.hand_over.covers(topic):
             source.unheard()
             self.hand_over.take(topic, callback, at_once=self.takes_at_once)
+        elif self.parcels is not None and self.parcels.covers(topic):
+            source.unheard()
+            self.parcels.take(topic, callback, qos)
         return source
 
     def on_other_publisher(self, source: SoleSource, text: str) -> None:
@@ -289,6 +300,8 @@ class RigNode(Node):
                 source.refuse_other_publisher(self.readiness.publishers(source.topic))
         if self.hand_over is not None:
             self.hand_over.begin(self.steady_timer)
+        if self.parcels is not None:
+            self.parcels.begin(self.steady_timer)
         if not self.stop.set:
             self.on_begin()
 
@@ -297,6 +310,8 @@ class RigNode(Node):
 
     def on_stop(self, executor: Executor) -> None:
         """Called when the session ends, after the last callback; what was published is delivered first."""
+        if self.parcels is not None:
+            self.parcels.send_log()
         patience = FAILED_PATIENCE if self.stop.failed else DELIVERY_PATIENCE
         if not delivered((made for _, made in self._outgoing), patience):
             self.get_logger().warning(f"not every subscriber confirmed the last messages within {patience:g} s")
@@ -342,7 +357,9 @@ class RigNode(Node):
             self.fail("supervisor_gone", "the session's supervisor was killed")
 
     def event(self, level: bytes, code: str, message: str, values: Mapping[str, str] | None = None) -> None:
-        """Publish an event; ``code`` is its reason code."""
+        """Publish an event; ``code`` is its reason code. What the log has to say before it is sent before it."""
+        if self.parcels is not None:
+            self.parcels.send_log()
         self._events.publish(self._array(level, self.role, message, {"code": code, **(values or {})}))
         self._log(level, code, message)
 
