@@ -225,9 +225,9 @@ class RigNode(Node):
         return send
 
     def send_off(self) -> None:
-        """Said is what the next nodes wait for: where it goes in a parcel, that leaves now."""
+        """Everything is said that other nodes wait for: where it goes in a parcel, that leaves now."""
         if self.parcels is not None:
-            self.parcels.send_next()
+            self.parcels.send_off()
 
     def publisher(self, topic: Topic, **options: Any) -> Publisher:
         """Create the publisher of a topic of the table; ``options`` as of :meth:`create_publisher`."""

@@ -9,7 +9,7 @@ second publisher (:mod:`pneumo_ros.nodes.sources`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rclpy.event_handler import PublisherEventCallbacks
@@ -23,37 +23,29 @@ if TYPE_CHECKING:
     from pneumo_ros.nodes.base import RigNode
 
 Take = Callable[[bytes], None]
-BATCH = 20  # messages of a parcel for the log: a node that is killed takes as many with it
+BATCH = 20  # messages of a parcel for the log, or some more: a node that is killed takes as many with it
 LOOK_AGAIN = 0.5  # s between looks who listens, and at most that a message for the log waits
 
 
 class Lane:
-    """Parcels to the same nodes.
+    """Messages that wait to go to the same nodes in one parcel.
 
     Parameters
     ----------
-    topic : that carries them
+    topic : that carries the parcels
     made : its publisher
-    batch : messages after which a parcel leaves unasked; 0 for never
     """
 
-    def __init__(self, topic: Topic, made: Publisher, batch: int) -> None:
+    def __init__(self, topic: Topic, made: Publisher) -> None:
         self.topic = topic
+        self.waiting: list[tuple[str, bytes]] = []
         self._send: Take = made.handle.publish_raw
-        self._batch = batch
-        self._waiting: list[tuple[str, bytes]] = []
-
-    def add(self, topic: str, data: bytes) -> None:
-        """One serialised message."""
-        self._waiting.append((topic, data))
-        if len(self._waiting) == self._batch:
-            self.send()
 
     def send(self) -> None:
-        """What waits, as one message."""
-        if self._waiting:
-            self._send(pack(self._waiting))
-            self._waiting.clear()
+        """What waits, if anything does."""
+        if self.waiting:
+            self._send(pack(self.waiting))
+            self.waiting.clear()
 
 
 class Outlet:
@@ -72,7 +64,7 @@ class Outlet:
     def publish(self, data: bytes) -> None:
         """One serialised message."""
         for lane in self.lanes:
-            lane.add(self.topic.name, data)
+            lane.waiting.append((self.topic.name, data))
         if self.heard:
             self._send(data)
 
@@ -87,7 +79,7 @@ class Parcels:
 
     def __init__(self, node: RigNode) -> None:
         self._node = node
-        self._next, self._log = self._lane(FOR_NEXT.get(node.role)), self._lane(FOR_LOG.get(node.role), BATCH)
+        self._next, self._log = self._lane(FOR_NEXT), self._lane(FOR_LOG)
         self._outlets: list[Outlet] = []
         self._takers: dict[str, dict[str, Take]] = {}
 
@@ -98,7 +90,7 @@ class Parcels:
     def sender(self, topic: Topic) -> Take:
         """Create the publisher of a topic; what sends its serialised messages."""
         takers = self._node.expected_subscribers
-        lanes = [lane for lane in (self._next, self._log) if lane and takers(lane.topic) & takers(topic)]
+        lanes = [one for one in (self._next, self._log) if one is not None and takers(one.topic) & takers(topic)]
         on_matched = PublisherEventCallbacks(matched=lambda _: self._look())
         outlet = Outlet(topic, lanes, self._node.publisher(topic, event_callbacks=on_matched))
         self._outlets.append(outlet)
@@ -113,14 +105,16 @@ class Parcels:
             self._node.subscribe(parcel, self._opener(parcel), qos)
         self._takers[parcel.name][topic.name] = callback
 
-    def send_next(self) -> None:
-        """What the next nodes wait for."""
-        if self._next:
+    def send_off(self) -> None:
+        """What the next nodes wait for; while they work, what is for the log as soon as it is a batch."""
+        if self._next is not None:
             self._next.send()
+        if self._log is not None and len(self._log.waiting) >= BATCH:
+            self._log.send()
 
     def send_log(self) -> None:
         """What is for the log, however little."""
-        if self._log:
+        if self._log is not None:
             self._log.send()
 
     def begin(self, timer: Callable[[float, Callable[[], None]], object]) -> None:
@@ -135,10 +129,11 @@ class Parcels:
             parcels = {lane.topic.name for lane in one.lanes}
             one.heard = not self._node.begun or self._node.readiness.outsiders(one.topic, one.made, parcels)
 
-    def _lane(self, parcel: Topic | None, batch: int = 0) -> Lane | None:
+    def _lane(self, parcels: Mapping[str, Topic]) -> Lane | None:
+        parcel = parcels.get(self._node.role)
         if parcel is None or not self._node.expected_subscribers(parcel):
             return None
-        return Lane(parcel, self._node.publisher(parcel), batch)
+        return Lane(parcel, self._node.publisher(parcel))
 
     def _opener(self, parcel: Topic) -> Take:
         takers = self._takers[parcel.name]
