@@ -35,18 +35,18 @@ There is no message package of the rig: every tool reads its logs without buildi
 ## Parcels
 
 In a lockstep session each node waits for the one before it, and between processes a message costs for being delivered,
-hardly for its size. The nodes of one session in several processes (`pneumo run`, the launch file) therefore send each other
-parcels: what a node says in one step as one message to the nodes that act on it, and about twenty messages as one to the
-recorder, which writes each of them to its own topic, byte for byte. Names that begin with `_` are hidden from ROS 2's
-tools; no log holds them. For everybody else nothing changes:
+hardly for its size. The nodes of one session in several processes (`pneumo run`, the launch file) therefore send each
+other parcels: what a node says in one step as one message to the nodes that act on it, and some twenty messages as one
+to the recorder, which writes each of them to its own topic, byte for byte. Names that begin with `_` are hidden from
+ROS 2's tools; no log holds them. For everybody else nothing changes:
 
-- A topic of the table is published as soon as anybody listens who is not of the session, and stays so as long as that lasts:
-  `ros2 bag record`, a plot, the dashboard. All its messages from the listener's discovery on are sent, then twice.
-- Nodes that are started by hand (no `session_id`), or in a session whose `session_nodes` leave out a role, hear the topics
-  themselves: a plant of your own publishes the three measurements and need not know of parcels.
+- A topic of the table is published as soon as anybody listens who is not of the session, and as long as that lasts:
+  `ros2 bag record`, a plot, the dashboard. From the discovery of the listener on every message is sent, then twice.
+- Nodes that are started by hand (no `session_id`), or in a session whose `session_nodes` leave out a role, hear the
+  topics themselves: a plant of your own publishes the three measurements and need not know of parcels.
 - Real time, hardware and replay have none; in one process nodes hand over what they say without the middleware.
-- A second publisher of a parcel ends the session as one of the topic does. A node that is killed takes its last parcel for
-  the log with it, some 20 messages; one that ends or tells an event sends it before.
+- A second publisher of a parcel ends the session as one of the topic does. A node that is killed takes its last parcel
+  for the log with it, some twenty messages; one that ends or tells an event sends it before.
 
 ## Quality of service and REP 2003
 

@@ -10,7 +10,7 @@ second publisher (:mod:`pneumo_ros.nodes.sources`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.publisher import Publisher
@@ -18,13 +18,28 @@ from rclpy.qos import QoSProfile
 
 from pneumo_ros.log.parcel import pack, unpack
 from pneumo_ros.log.topics import FOR_LOG, FOR_NEXT, IN_PARCELS, Topic
-
-if TYPE_CHECKING:
-    from pneumo_ros.nodes.base import RigNode
+from pneumo_ros.nodes.readiness import Readiness
 
 Take = Callable[[bytes], None]
 BATCH = 20  # messages of a parcel for the log, or some more: a node that is killed takes as many with it
 LOOK_AGAIN = 0.5  # s between looks who listens, and at most that a message for the log waits
+
+
+class Owner(Protocol):
+    """What parcels need of their node, which is a :class:`~pneumo_ros.nodes.base.RigNode`."""
+
+    role: str
+    readiness: Readiness
+    begun: bool
+
+    @property
+    def session_nodes(self) -> set[str]: ...
+
+    def expected_subscribers(self, topic: Topic) -> set[str]: ...
+
+    def publisher(self, topic: Topic, **options: Any) -> Publisher: ...
+
+    def subscribe(self, topic: Topic, callback: Take, qos: QoSProfile | None = None) -> object: ...
 
 
 class Lane:
@@ -77,7 +92,7 @@ class Parcels:
     node : of a lockstep session whose nodes know one another, in a process of its own
     """
 
-    def __init__(self, node: RigNode) -> None:
+    def __init__(self, node: Owner) -> None:
         self._node = node
         self._next, self._log = self._lane(FOR_NEXT), self._lane(FOR_LOG)
         self._outlets: list[Outlet] = []
