@@ -215,12 +215,11 @@ class RigNode(Node):
 
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
         """Create the publisher of a topic of the table; what sends serialised bytes with it, or in a shorter way."""
-        if self.hand_over is not None and self.hand_over.covers(topic):
-            outlet = self.hand_over.outlet(topic)
-            outlet.attach(self.publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
-            return outlet.publish
-        if self.parcels is not None and self.parcels.covers(topic):
-            return self.parcels.sender(topic)
+        for shorter in (self.hand_over, self.parcels):
+            if shorter is not None and shorter.covers(topic):
+                outlet = shorter.outlet(topic)
+                outlet.attach(self.publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
+                return outlet.publish
         send: Callable[[bytes], None] = self.publisher(topic).handle.publish_raw
         return send
 
@@ -237,9 +236,11 @@ class RigNode(Node):
         return made
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: QoSProfile | None = None) -> SoleSource:
-        """Receive a topic of the table, from its one publisher, as serialised bytes."""
-        source = SoleSource(self, topic, self.on_other_publisher)
+        """Receive a topic of the table, or the parcels it comes in, from its one publisher, as serialised bytes."""
         qos = qos or subscriber_qos(topic.flow, self.lockstep)
+        if self.parcels is not None and self.parcels.covers(topic):
+            return self.parcels.take(topic, callback, qos)
+        source = SoleSource(self, topic, self.on_other_publisher)
         made = self.create_subscription(
             message_class(topic.type), topic.relative, callback, qos,
             event_callbacks=source.callbacks() if topic.publisher else None, raw=True,
@@ -249,15 +250,21 @@ class RigNode(Node):
         if self.hand_over is not None and self.hand_over.covers(topic):
             source.unheard()
             self.hand_over.take(topic, callback, at_once=self.takes_at_once)
-        elif self.parcels is not None and self.parcels.covers(topic):
-            source.unheard()
-            self.parcels.take(topic, callback, qos)
         return source
 
     def on_other_publisher(self, source: SoleSource, text: str) -> None:
         """Somebody else publishes what this node takes from one publisher; nothing more of it is used."""
         source.mute()
-        text = source.too_many(NAMING) if source.count > 1 else text
+        self._refuse_publisher(source.too_many(NAMING) if source.count > 1 else text)
+
+    def sole_publisher(self, topic: Topic) -> None:
+        """End the session if anybody else publishes a topic of this node's."""
+        source = SoleSource(self, topic, self.on_other_publisher)
+        source.count = len(source.publishers())
+        if source.count > 1:
+            self._refuse_publisher(source.too_many(NAMING))
+
+    def _refuse_publisher(self, text: str) -> None:
         self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
 
     def _on_other_session(self, text: str) -> None:
@@ -266,7 +273,11 @@ class RigNode(Node):
             self.fail("other_session", f"{text}; end it, or use --domain N or --isolate")
 
     def expected_subscribers(self, topic: Topic) -> set[str]:
-        """Nodes of the session that take ``topic``."""
+        """Nodes of the session that take ``topic`` itself, not in parcels."""
+        return set() if self.parcels is not None and self.parcels.covers(topic) else self.takers(topic)
+
+    def takers(self, topic: Topic) -> set[str]:
+        """Other nodes of the session that act on what ``topic`` carries, or record it."""
         takers = {*topic.subscribers, *(("session_recorder",) if topic.recorded else ())}
         return takers & self.session_nodes - {self.role}
 
@@ -298,10 +309,9 @@ class RigNode(Node):
             if source.topic.publisher:
                 source.held = bool(self.values["session_id"])
                 source.refuse_other_publisher(self.readiness.publishers(source.topic))
-        if self.hand_over is not None:
-            self.hand_over.begin(self.steady_timer)
-        if self.parcels is not None:
-            self.parcels.begin(self.steady_timer)
+        for shorter in (self.hand_over, self.parcels):
+            if shorter is not None:
+                shorter.begin(self.steady_timer)
         if not self.stop.set:
             self.on_begin()
 

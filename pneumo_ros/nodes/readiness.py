@@ -9,7 +9,7 @@ matched.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rclpy.node import Node
@@ -66,13 +66,6 @@ class Readiness:
         told = [self._said.get(role, {}).get("subscriptions", {}).get(topic.name) for role in takers]
         there = {gid_of(i) for i in self._node.get_subscriptions_info_by_topic(topic.relative)}
         return all(gids and there.issuperset(gids) for gids in told) and publisher.get_subscription_count() >= len(told)
-
-    def outsiders(self, topic: Topic, publisher: Publisher, instead: Collection[str]) -> bool:
-        """Whether anybody listens to ``topic`` but nodes of this session that take a topic of ``instead``, by name."""
-        taken = [said["subscriptions"] for said in self._said.values()]
-        ours = {gid for one in taken if not one.keys().isdisjoint(instead) for gid in one.get(topic.name, [])}
-        there = {gid_of(i) for i in self._node.get_subscriptions_info_by_topic(topic.relative)}
-        return not there <= ours or publisher.get_subscription_count() > len(there)
 
     def publishers(self, topic: Topic) -> set[str]:
         """Identifiers of the publishers of ``topic`` that this session's nodes have announced."""
