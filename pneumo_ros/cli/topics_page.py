@@ -29,7 +29,27 @@ There is no message package of the rig: every tool reads its logs without buildi
 - **`DiagnosticArray` for events** as well as for `/diagnostics`: level, text and keyed values that every monitor
   shows. By REP 107 a status of `/diagnostics` is named `node: part` and comes at 1 Hz; `hardware_id` is the board's
   serial number (node `daq`, once the board has answered) or the rig's name.
+- **`UInt8MultiArray` for parcels**, several serialised messages in one (layout: `pneumo_ros/log/parcel.py`): see below.
 - **YAML in `String`** for the parameters of rig and nodes: written once, read by people.
+
+## Parcels
+
+In a lockstep session each node waits for the one before it, and between processes a message costs for being delivered,
+hardly for its size. The nodes of one session in several processes (`pneumo run`, the launch file) therefore send each
+other parcels: what a node says in one step as one message to the nodes that act on it, and some twenty messages as one
+to the recorder, which writes each of them to its own topic, byte for byte. They do not subscribe to the topics
+themselves. Names that begin with `_` are hidden from ROS 2's tools; no log holds them. For everybody else nothing
+changes:
+
+- A topic of the table is sent as well while anybody listens, every message from the discovery of the listener on:
+  `ros2 bag record`, a plot, the dashboard.
+- Nodes that are started by hand (no `session_id`), or in a session whose `session_nodes` leave out a role, hear the
+  topics themselves: a plant of your own publishes the three measurements and need not know of parcels.
+- Real time, hardware and replay have none; in one process nodes hand over what they say without the middleware.
+- A second publisher ends the session: of a parcel before anything of it is used, of a topic, of which the session
+  uses nothing, within half a second.
+- A node that is killed takes its last parcel for the log with it, some twenty messages; one that ends or tells an
+  event sends it before.
 
 ## Quality of service and REP 2003
 

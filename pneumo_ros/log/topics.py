@@ -68,6 +68,7 @@ class Topic:
 JOINT = "sensor_msgs/msg/JointState"
 PRESSURE = "sensor_msgs/msg/FluidPressure"
 STRING = "std_msgs/msg/String"
+PARCEL = "std_msgs/msg/UInt8MultiArray"
 DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 ROAD = Topic(
@@ -175,9 +176,29 @@ ROBOT_DESCRIPTION = Topic(
     "/robot_description", STRING, "URDF of the rig, for viewers", "joint_states", flow=Flow.LATCHED, recorded=False,
 )  # fmt: skip
 
+SENDERS = ("road_profile", "plant", "estimator", "controller")
+IN_PARCELS = (ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH)
+FOR_NEXT = {
+    sender: Topic(
+        f"/_parcels/{sender}", PARCEL, f"what {sender} says in one step, to the nodes that wait for it (lockstep)",
+        sender, tuple({s: 0 for t in IN_PARCELS if t.publisher == sender for s in t.subscribers if s in SENDERS}),
+        recorded=False,
+    )
+    for sender in SENDERS
+}  # fmt: skip
+FOR_LOG = {
+    sender: Topic(
+        f"/_parcels/{sender}/log", PARCEL, f"what {sender} says in several steps, to the recorder (lockstep)", sender,
+        ("session_recorder",), recorded=False,
+    )
+    for sender in SENDERS
+}  # fmt: skip
+"""Parcels by sender (nodes/parcels.py); ROS 2 hides names that begin with an underscore from its tools."""
+
 TOPICS: tuple[Topic, ...] = (
     ROAD, DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE, COMMAND, ESTIMATE, SLIDING, TRUTH, CLOCK, CONFIG, SETUP,
     EVENTS, DIAGNOSTIC, ESTOP, READY, RAW, SUPPLY_PRESSURE, APPLIED, CALIBRATION, JOINT_STATES, ROBOT_DESCRIPTION,
+    *FOR_NEXT.values(), *FOR_LOG.values(),
 )  # fmt: skip
 MEASUREMENTS = (DISPLACEMENT, FRONT_PRESSURE, REAR_PRESSURE)
 BY_NAME = {topic.name: topic for topic in TOPICS}

@@ -37,6 +37,7 @@ from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
 from pneumo_ros.nodes.delivery import DELIVERY_PATIENCE, delivered
 from pneumo_ros.nodes.hand_over import HandOver
 from pneumo_ros.nodes.interfaces import message_class
+from pneumo_ros.nodes.parcels import Parcels
 from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
 from pneumo_ros.nodes.sources import NAMING, SoleSource
@@ -135,6 +136,8 @@ class RigNode(Node):
         self.sources: list[SoleSource] = []
         self._outgoing: list[tuple[Topic, Publisher]] = []
         self._logged: dict[str, float] = {}
+        apart = self.lockstep and self.hand_over is None and self.values["session_id"]
+        self.parcels = Parcels(self) if apart else None
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -210,30 +213,36 @@ class RigNode(Node):
         """A timer on a steady clock: simulated time may stand still, waiting and watching must not."""
         return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def publisher(self, topic: Topic) -> Publisher:
-        """Create the publisher of a topic of the table."""
-        return self._publisher(topic)
-
     def sender(self, topic: Topic) -> Callable[[bytes], None]:
-        """Create the publisher of a topic of the table; what sends serialised bytes with it, or hands them over."""
-        if self.hand_over is None or not self.hand_over.covers(topic):
-            send: Callable[[bytes], None] = self._publisher(topic).handle.publish_raw
-            return send
-        outlet = self.hand_over.outlet(topic)
-        outlet.attach(self._publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
-        return outlet.publish
+        """Create the publisher of a topic of the table; what sends serialised bytes with it, or in a shorter way."""
+        for shorter in (self.hand_over, self.parcels):
+            if shorter is not None and shorter.covers(topic):
+                outlet = shorter.outlet(topic)
+                outlet.attach(self.publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
+                return outlet.publish
+        send: Callable[[bytes], None] = self.publisher(topic).handle.publish_raw
+        return send
 
-    def _publisher(self, topic: Topic, **options: Any) -> Publisher:
+    def send_off(self) -> None:
+        """Everything is said that other nodes wait for: where it goes in a parcel, that leaves now."""
+        if self.parcels is not None:
+            self.parcels.send_off()
+
+    def publisher(self, topic: Topic, **options: Any) -> Publisher:
+        """Create the publisher of a topic of the table; ``options`` as of :meth:`create_publisher`."""
         qos = publisher_qos(topic.flow, self.lockstep)
         made = self.create_publisher(message_class(topic.type), topic.relative, qos, **options)
         self._outgoing.append((topic, made))
         return made
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: QoSProfile | None = None) -> SoleSource:
-        """Receive a topic of the table, from its one publisher, as serialised bytes."""
+        """Receive a topic of the table, or the parcels it comes in, from its one publisher, as serialised bytes."""
+        qos = qos or subscriber_qos(topic.flow, self.lockstep)
+        if self.parcels is not None and self.parcels.covers(topic):
+            return self.parcels.take(topic, callback, qos)
         source = SoleSource(self, topic, self.on_other_publisher)
         made = self.create_subscription(
-            message_class(topic.type), topic.relative, callback, qos or subscriber_qos(topic.flow, self.lockstep),
+            message_class(topic.type), topic.relative, callback, qos,
             event_callbacks=source.callbacks() if topic.publisher else None, raw=True,
         )  # fmt: skip
         source.attach(made)
@@ -246,7 +255,16 @@ class RigNode(Node):
     def on_other_publisher(self, source: SoleSource, text: str) -> None:
         """Somebody else publishes what this node takes from one publisher; nothing more of it is used."""
         source.mute()
-        text = source.too_many(NAMING) if source.count > 1 else text
+        self._refuse_publisher(source.too_many(NAMING) if source.count > 1 else text)
+
+    def sole_publisher(self, topic: Topic) -> None:
+        """End the session if anybody else publishes a topic of this node's."""
+        source = SoleSource(self, topic, self.on_other_publisher)
+        source.count = len(source.publishers())
+        if source.count > 1:
+            self._refuse_publisher(source.too_many(NAMING))
+
+    def _refuse_publisher(self, text: str) -> None:
         self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
 
     def _on_other_session(self, text: str) -> None:
@@ -255,7 +273,11 @@ class RigNode(Node):
             self.fail("other_session", f"{text}; end it, or use --domain N or --isolate")
 
     def expected_subscribers(self, topic: Topic) -> set[str]:
-        """Nodes of the session that take ``topic``."""
+        """Nodes of the session that take ``topic`` itself, not in parcels."""
+        return set() if self.parcels is not None and self.parcels.covers(topic) else self.takers(topic)
+
+    def takers(self, topic: Topic) -> set[str]:
+        """Other nodes of the session that act on what ``topic`` carries, or record it."""
         takers = {*topic.subscribers, *(("session_recorder",) if topic.recorded else ())}
         return takers & self.session_nodes - {self.role}
 
@@ -287,8 +309,9 @@ class RigNode(Node):
             if source.topic.publisher:
                 source.held = bool(self.values["session_id"])
                 source.refuse_other_publisher(self.readiness.publishers(source.topic))
-        if self.hand_over is not None:
-            self.hand_over.begin(self.steady_timer)
+        for shorter in (self.hand_over, self.parcels):
+            if shorter is not None:
+                shorter.begin(self.steady_timer)
         if not self.stop.set:
             self.on_begin()
 
@@ -297,6 +320,8 @@ class RigNode(Node):
 
     def on_stop(self, executor: Executor) -> None:
         """Called when the session ends, after the last callback; what was published is delivered first."""
+        if self.parcels is not None:
+            self.parcels.send_log()
         patience = FAILED_PATIENCE if self.stop.failed else DELIVERY_PATIENCE
         if not delivered((made for _, made in self._outgoing), patience):
             self.get_logger().warning(f"not every subscriber confirmed the last messages within {patience:g} s")
@@ -342,7 +367,9 @@ class RigNode(Node):
             self.fail("supervisor_gone", "the session's supervisor was killed")
 
     def event(self, level: bytes, code: str, message: str, values: Mapping[str, str] | None = None) -> None:
-        """Publish an event; ``code`` is its reason code."""
+        """Publish an event; ``code`` is its reason code. What the log has to say before it is sent before it."""
+        if self.parcels is not None:
+            self.parcels.send_log()
         self._events.publish(self._array(level, self.role, message, {"code": code, **(values or {})}))
         self._log(level, code, message)
 

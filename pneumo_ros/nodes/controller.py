@@ -79,6 +79,7 @@ class ControllerNode(StageNode[ControllerStage]):
             self._say_refused(stamp)
         self._said = stamp
         self._publish(self._command(stamp, output.values))
+        self.send_off()
         if self._steps % self.values["telemetry_every"] == 0:
             self._publish_sliding(self._sliding(stamp, output.telemetry))
         self._steps += 1

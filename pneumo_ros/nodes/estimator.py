@@ -53,6 +53,7 @@ class EstimatorNode(StageNode[EstimatorStage]):
             return
         start = time.monotonic_ns()
         self._publish(self._encode(stamp, self.advance(stamp, self._sample).values))
+        self.send_off()
         self.timed(start)
 
 

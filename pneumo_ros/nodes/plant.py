@@ -174,6 +174,7 @@ class PlantNode(RigNode):
         self._send_measurement[0](self._displacement.encode(stamp, values[:4]))
         self._send_measurement[1](self._pressures[0].encode(stamp, values[4]))
         self._send_measurement[2](self._pressures[1].encode(stamp, values[5]))
+        self.send_off()
         if self.index % self.values["truth_every"] == 0:
             known = self.stepped.truth(self.state, self.command, self.road[1])
             self._publish_truth(self._truth.encode(stamp, known.tolist()))

@@ -58,6 +58,7 @@ class RoadProfileNode(RigNode):
         # A clock that jumps ahead leaves a hole in the road; filling it would flood the log.
         for i in range(max(self._sent + 1, index - BLOCK), index + 1):
             self._send(i)
+        self.send_off()
         self._sent = max(self._sent, index)
         self.timed(start)
 

@@ -16,12 +16,15 @@ pytest.importorskip("rclpy")
 import rclpy
 from helpers import sessions
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import stamp_of
 from pneumo_ros.log.decoded import Log
+from pneumo_ros.log.parcel import pack
 from pneumo_ros.log.reading import read_log
+from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.neighbours import LOOK_FOR, neighbours
 from pneumo_ros.nodes.qos import recorder_qos
 from pneumo_ros.session.claim import Claim, runtime_folder
@@ -54,11 +57,11 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 @contextmanager
-def intruder(domain: int, topic: str) -> Iterator[Any]:
+def intruder(domain: int, topic: str, kind: Any = JointState) -> Iterator[Any]:
     """A node that publishes what belongs to a session."""
     with sessions.own_context(domain) as context:
         node = rclpy.create_node("intruder", context=context)
-        yield node.create_publisher(JointState, topic, 10)
+        yield node.create_publisher(kind, topic, 10)
 
 
 @pytest.mark.slow
@@ -102,47 +105,65 @@ def test_simulations_isolate_themselves_and_log_what_they_log_alone(tmp_path: Pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [(), ("--single-process",)], ids=["processes", "one process"])
+@pytest.mark.parametrize(
+    ("options", "topic"),
+    [
+        ((), topics.COMMAND),
+        (("--single-process",), topics.COMMAND),
+        ((), topics.FOR_NEXT["controller"]),
+        ((), topics.FOR_LOG["controller"]),
+    ],
+    ids=["processes", "one process", "parcels", "parcels for the log"],
+)
 def test_a_second_publisher_of_commands_ends_the_session_and_nothing_of_it_is_used(
-    tmp_path: Path, alone: Log, options: tuple[str, ...]
+    tmp_path: Path, alone: Log, options: tuple[str, ...], topic: topics.Topic
 ) -> None:
     domain, path = sessions.own_domain(), tmp_path / "x.mcap"
+    command = serialize_message(JointState(name=list(topics.COMMAND.names), position=[1e-5] * 4))
+    message = command if topic is topics.COMMAND else pack([(topics.COMMAND.name, command)])
     process = sessions.start(*ENDLESS, *options, "--output", str(path), domain=domain)
     sessions.wait_for(process, path.with_name("x.mcap.part"), 300_000)
-    with intruder(domain, "/valve/command") as publisher:
-        message = JointState(name=list(topics.COMMAND.names), position=[1e-5] * 4)
+    with intruder(domain, topic.name, message_class(topic.type)) as publisher:
         while process.poll() is None:
             publisher.publish(message)
             time.sleep(0.001)
     said, _ = process.communicate(timeout=180)
-    assert process.returncode == 1 and "2 nodes publish /valve/command" in said and "/intruder" in said, said
+    assert process.returncode == 1 and f"2 nodes publish {topic.name}" in said and "/intruder" in said, said
     log = read_log(path)
-    assert ending(log)["complete"] == "false" and "/valve/command" in ending(log)["reason"]
+    assert ending(log)["complete"] == "false" and topic.name in ending(log)["reason"]
     same_as_alone(alone, log, whole=False)
 
 
 @pytest.mark.slow
-def test_a_listener_outside_of_one_process_hears_what_its_nodes_hand_over(tmp_path: Path, alone: Log) -> None:
+@pytest.mark.parametrize("options", [(), ("--single-process",)], ids=["processes", "one process"])
+def test_a_listener_outside_hears_what_nodes_hand_over_or_put_into_parcels(
+    tmp_path: Path, alone: Log, options: tuple[str, ...]
+) -> None:
     domain, path = sessions.own_domain(), tmp_path / "x.mcap"
-    process = sessions.start(*ENDLESS, "--single-process", "--output", str(path), domain=domain)
+    process = sessions.start(*ENDLESS, *options, "--output", str(path), domain=domain)
     sessions.wait_for(process, path.with_name("x.mcap.part"), 100_000)
-    heard: list[bytes] = []
+    heard: dict[str, list[bytes]] = {topic.name: [] for topic in topics.EVERY_PERIOD}
     with sessions.own_context(domain) as context:
         node = rclpy.create_node("listener", context=context)
-        qos = recorder_qos(topics.ESTIMATE.flow)
-        node.create_subscription(JointState, topics.ESTIMATE.name, heard.append, qos, raw=True)
+        for topic in topics.EVERY_PERIOD:
+            qos, take = recorder_qos(topic.flow), heard[topic.name].append
+            node.create_subscription(message_class(topic.type), topic.name, take, qos, raw=True)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         end = time.monotonic() + 60.0
-        while len(heard) < 500 and time.monotonic() < end:
+        while min(map(len, heard.values())) < 500 and time.monotonic() < end:
             executor.spin_once(timeout_sec=0.1)
         executor.shutdown()
     process.send_signal(2)
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 0, said
     log = read_log(path)
-    stamps = np.array([stamp_of(data) for data in heard[:500]])
-    assert len(stamps) == 500 and (np.diff(stamps) == 2_000_000).all(), "whoever joins misses nothing from then on"
+    for name, messages in heard.items():
+        stamps = [stamp_of(data) for data in messages]
+        assert len(stamps) >= 500 and set(np.diff(stamps)) == {2_000_000}, f"{name}: who joins misses nothing from then"
+        records = log.records(name)
+        logged = {stamp_of(data): data for data in map(records.message, range(len(records)))}
+        assert [logged[stamp] for stamp in stamps[:500]] == messages[:500], name
     assert ending(log)["complete"] == "true"
     same_as_alone(alone, log, whole=False)
 
