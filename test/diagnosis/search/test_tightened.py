@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search with tight tolerances, on a load that hides in the gains of four signals: what is found is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from helpers.driven_log import DrivenLog
+
+from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.model import PlainEffect
+from pneumo_ros.diagnosis.search.competition import compete
+from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.state import Effort, Search
+from pneumo_ros.diagnosis.search.tightened import TIGHTNESS, search_tightened
+from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
+
+ROWS, PERIOD, NOISE, STD = 4000, 5e-3, 0.02, 0.1
+RNG = np.random.default_rng(5)
+TIME = np.arange(ROWS) * PERIOD
+CARRIED = [np.sin(2.0 * np.pi * f * TIME + RNG.uniform(0.0, 6.0)) for f in (0.4, 0.9, 1.7, 2.6)]
+OTHER = np.sin(2.0 * np.pi * 3.8 * TIME)
+SIGNALS = {"load": sum(CARRIED), "decoy": sum(CARRIED[:2]) + 0.2 * OTHER, "other": OTHER}
+SIZE = (EffectParameter("size", "1", -5.0, 5.0, 0.3, size=True),)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Output: four signals with a gain each, and the active signals."""
+
+    channels: tuple[str, ...] = ("y",)
+    parameters: tuple[Parameter, ...] = tuple(Parameter(f"gain_{k}", "1", 1.0, STD) for k in range(4))
+    effects: dict[str, PlainEffect] = field(default_factory=lambda: {k: PlainEffect(k, ("",), SIZE) for k in SIGNALS})
+
+    def initial(self, record: DrivenLog, active: Sequence[Active] = ()) -> tuple[Array, Array]:
+        return np.zeros(1), np.full(1, 1e-3)
+
+    def predict(
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> Array:
+        out = sum(gain * one for gain, one in zip(nuisance, CARRIED, strict=True)) + initial[0]
+        out = out + sum(one.values[0] * SIGNALS[one.effect] for one in active)
+        return np.asarray(out[:rows, None])
+
+    def places(self, active: Active) -> tuple[str, ...]:
+        return (f"place_{active.effect}",)
+
+    def side(self, active: Active) -> str | None:
+        return None
+
+
+def searched(name: str, size: float) -> Search:
+    noise = np.random.default_rng(3).normal(0.0, NOISE, ROWS)
+    y = sum(CARRIED) + size * SIGNALS[name] + noise
+    problem = Problem(Gains(), (DrivenLog(y[:, None], CARRIED[0], "made", PERIOD, NOISE),))
+    return compete(problem, Effort(), True, lambda share, what: None)
+
+
+def test_what_hid_in_strained_tolerances_is_found_with_these_held_tightly() -> None:
+    search = searched("load", 0.8)
+    for kept in ("singles", "pairs", "structures"):  # as if the load had never been tried beside strained gains
+        setattr(search, kept, [one for one in getattr(search, kept) if ("load", "") not in one.candidate.laws])
+    strained = min(search.finalists, key=lambda one: one.cost)
+    assert np.sum(strained.x[:4] ** 2) > 1.5 * 4.0
+    search_tightened(search, Thresholds())
+    refit, *others = (score(search.problem, one) for one in (search.refit, *search.finalists))
+    chosen = select(refit, others, Thresholds())
+    assert chosen.fit.candidate.laws == (("load", ""),) and chosen.stretch < 1.0
+    (size,) = search.problem.values(chosen.fit.candidate, chosen.fit.x)
+    assert abs(size - 0.8) < 0.03
+    assert all(one.candidate.laws for one in search.structures)
+
+
+def test_tolerances_at_rest_need_no_second_search() -> None:
+    search = searched("other", 0.5)
+    before = list(search.structures)
+    search_tightened(search, Thresholds())
+    assert search.structures == before
+
+
+def test_tightness_weighs_the_tolerances_and_nothing_else() -> None:
+    problem = searched("other", 0.5).problem
+    candidate = Candidate((("other", ""),))
+    told, tight = problem.prior(candidate), replace(problem, tightness=TIGHTNESS).prior(candidate)
+    assert np.array_equal(tight[:4], TIGHTNESS * told[:4]) and np.array_equal(tight[4:], told[4:])
