@@ -30,6 +30,8 @@ from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 MODEL_FORM_FLOOR: Final = 2.5e-3
 COARSE_BELOW: Final = 2.5e-3  # s between rows; a slower log is not halved for its sensitivities [numerics]
 REACH: Final = 3.0  # prior sigmas that a nuisance parameter may move [taste]
+# Mean square of the tolerances, prior sigmas, from which on a structure strains them; one is as told [taste]
+STRAINED: Final = 1.5
 # Factor on the std of the measured initial state: its samples were low-passed, which white noise does not know
 # [taste]
 INITIAL_WIDENING: Final = 3.0
@@ -233,6 +235,11 @@ class Problem:
         """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""
         scaled = [v / p.typical for v, p in zip(values, self.effect_parameters(candidate), strict=True)]
         return np.concatenate([np.zeros(self.fixed) if fixed is None else fixed, scaled])
+
+    def strains(self, x: Array) -> bool:
+        """Whether scaled unknowns strain the tolerances, as where these answer for an effect that is missing."""
+        own = x[: len(self.model.parameters)]
+        return len(own) > 0 and bool(own @ own >= STRAINED * len(own))
 
     def values(self, candidate: Candidate, x: Array) -> Array:
         """Effect values, SI."""

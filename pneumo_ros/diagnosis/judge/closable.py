@@ -62,7 +62,7 @@ class EffectEvidence:
     follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
         follows, over the least that this kind of error leaves; infinite where nothing is asked
     missing : what the structure leaves in the equations along the held-out log, and what is left there without the
-        effect, mean squares in null variances; None where nobody looked
+        effect, mean squares in null variances; None where nobody looked, or where the tolerances answer for it
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -188,7 +188,9 @@ def closable(
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
         without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
-        missing = None if equations is None else (still, left_in(equations, problem, bare))
+        # The equations estimate the tolerances anew: where these answer for the effect, they do so there as well.
+        answered = problem.strains(bare.x) and not problem.strains(best.x)
+        missing = None if equations is None or answered else (still, left_in(equations, problem, bare))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,

@@ -18,8 +18,6 @@ from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Search
 
-# Mean square of the tolerances, prior sigmas, from which on a structure strains them; one is as told [taste]
-STRAINED: Final = 1.5
 TIGHTNESS: Final = 10.0  # times the weight that the tolerances have in the second search [taste]
 # Less than a first search needs: that one has seen what needs no tight tolerances [numerics]
 EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair_finalists=2, probes=8, exchanged=3)
@@ -33,7 +31,7 @@ def search_tightened(search: Search, limits: Thresholds) -> None:
     problem = search.problem
     finalists = [score(problem, one) for one in search.finalists]
     best = select(score(problem, search.refit), finalists, limits)
-    if not best.size or best.stretch < STRAINED * len(problem.model.parameters) or not room_for_more(search):
+    if not best.size or not problem.strains(best.fit.x) or not room_for_more(search):
         return
 
     def told(_: float, what: str) -> None:

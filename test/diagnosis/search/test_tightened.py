@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pytest
 from helpers.driven_log import DrivenLog
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.judge.closable import closable
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
@@ -64,7 +66,7 @@ def test_what_hid_in_strained_tolerances_is_found_with_these_held_tightly() -> N
     for kept in ("singles", "pairs", "structures"):  # as if the load had never been tried beside strained gains
         setattr(search, kept, [one for one in getattr(search, kept) if ("load", "") not in one.candidate.laws])
     strained = min(search.finalists, key=lambda one: one.cost)
-    assert np.sum(strained.x[:4] ** 2) > 1.5 * 4.0
+    assert search.problem.strains(strained.x)
     search_tightened(search, Thresholds())
     refit, *others = (score(search.problem, one) for one in (search.refit, *search.finalists))
     chosen = select(refit, others, Thresholds())
@@ -86,3 +88,13 @@ def test_tightness_weighs_the_tolerances_and_nothing_else() -> None:
     candidate = Candidate((("other", ""),))
     told, tight = problem.prior(candidate), replace(problem, tightness=TIGHTNESS).prior(candidate)
     assert np.array_equal(tight[:4], TIGHTNESS * told[:4]) and np.array_equal(tight[4:], told[4:])
+
+
+@pytest.mark.parametrize("name, asked", [("load", False), ("other", True)])
+def test_equations_are_not_asked_for_what_the_tolerances_answer(name: str, asked: bool) -> None:
+    search = searched(name, 0.8)
+    problem = search.problem
+    best = next(one for one in search.finalists if one.candidate.laws == ((name, ""),))
+    told = closable(problem, best, problem.records[0], 0.02, 0.5, (), lambda nuisance, active: 5.0)
+    (evidence,) = told.effects
+    assert evidence.missing == ((5.0, 5.0) if asked else None)
