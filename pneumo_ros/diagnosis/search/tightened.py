@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A second search with the tolerances held tightly, where the first one's structure strains them.
+"""A second search with the tolerances held tightly, where the first one's structure strains them or leaves much.
 
 While an effect is missing the tolerances answer for it as far as they reach, most of them to their bounds: a load hides
 in masses and areas, and what the search then adds closes what these have left. With its tolerances near their nominal
 values a rig shows such an effect; what is found so is fitted once more with the tolerances as they are told and
-competes with the rest.
+competes with the rest. They also are a start of their own: beside tolerances that answer for it, a law that is not the
+rig's, and its family's shape, may end far from where they end beside these at rest.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Search
 
 TIGHTNESS: Final = 10.0  # times the weight that the tolerances have in the second search [taste]
+# Mean square on the kept blocks, sigma squared, and share of the refit's, that is much to be left [numerics]
+MUCH: Final = 2.0
+MUCH_OF_REFIT: Final = 0.01
 # Less than a first search needs: that one has seen what needs no tight tolerances [numerics]
 EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair_finalists=2, probes=8, exchanged=3)
 
@@ -26,12 +30,12 @@ EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair
 def search_tightened(search: Search, limits: Thresholds) -> None:
     """Add to ``search.structures`` what a search with tight tolerances finds, fitted with the tolerances as told.
 
-    Nothing where the best structure leaves its tolerances alone, or leaves nothing to find.
+    Nothing where the best structure leaves its tolerances alone and little besides, or leaves nothing to find.
     """
-    problem = search.problem
-    finalists = [score(problem, one) for one in search.finalists]
-    best = select(score(problem, search.refit), finalists, limits)
-    if not best.size or not problem.strains(best.fit.x) or not room_for_more(search):
+    problem, refit = search.problem, score(search.problem, search.refit)
+    best = select(refit, [score(problem, one) for one in search.finalists], limits)
+    much = best.level > max(MUCH, MUCH_OF_REFIT * refit.level)
+    if not (much or (best.size and problem.strains(best.fit.x))) or not room_for_more(search):
         return
 
     def told(_: float, what: str) -> None:
