@@ -20,9 +20,8 @@ from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Search
 
 TIGHTNESS: Final = 10.0  # times the weight that the tolerances have in the second search [taste]
-# Mean square on the kept blocks, sigma squared, and share of the refit's, that is much to be left [numerics]
-MUCH: Final = 2.0
-MUCH_OF_REFIT: Final = 0.01
+MUCH: Final = 2.0  # mean square on the kept blocks, sigma squared, that is much to be left [numerics]
+MUCH_OF_REFIT: Final = 0.01  # the same as a share of the refit's [numerics]
 # Less than a first search needs: that one has seen what needs no tight tolerances [numerics]
 EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair_finalists=2, probes=8, exchanged=3)
 
