@@ -153,7 +153,8 @@ def used_unknowns(fit: Fit) -> int:
 def score(problem: Problem, fit: Fit) -> Scored:
     """What is left on the selection blocks; samples that are missing do not count."""
     there = problem.weight > 0.0
-    squares = np.where(there, fit.residual**2, 0.0)
+    with np.errstate(over="ignore"):  # of a run that leaves the log by so much the square has no end
+        squares = np.where(there, fit.residual**2, 0.0)
     blocks = []
     for number in np.unique(problem.block[~problem.fitted]):
         rows = problem.block == number
