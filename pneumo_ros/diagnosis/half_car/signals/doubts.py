@@ -18,6 +18,9 @@ from pneumo_ros.units import GRAVITY
 ROAD_LIMIT: Final = 0.5  # m; the exciter moves by centimetres [physics]
 # s by which a topic's delay may move against the others: a stalled recorder delays all alike [taste]
 CLOCK_STEP: Final = 0.05
+# Share of a sample's period by which a hardware log's stamps may be off before that is told: half a millisecond at 500
+# Hz moves a wheel on a class D road by 0.05 mm, five times its sensor's noise [physics]
+OFF_PACE: Final = 0.25
 PIECES: Final = 3  # the delay of the first third is compared with the last third's [numerics]
 # Spring force over static load at the middle of a log that is right: an area or a load off by a tenth at both ends
 # stays outside [physics]
@@ -62,6 +65,32 @@ def check_clocks(topics: Mapping[str, TopicData], log: str) -> list[Limitation]:
                               "the end; its stamps are even, so they are used as they are.")
         for topic, change in late.items()
     ]  # fmt: skip
+
+
+def check_pace(road: TopicData, measured: TopicData, log: str) -> list[Limitation]:
+    """What is said of a hardware log whose stamps do not keep the board's pace: it samples evenly, and the road begins
+    with its first sample. A computer that was busy stamps late what it hears late.
+    """
+    steps = np.diff(measured.stamp)
+    period = float(np.median(steps))
+    found = []
+    late = float(road.stamp[0] - measured.stamp[0])
+    if late > OFF_PACE * period:
+        text = (
+            f"/road/profile begins {1e3 * late:.2g} ms after the rig's first sample, with which it is played: the "
+            "computer was busy, and what is said of road and tyres may come from that. Record it again."
+        )
+        found.append(Limitation("road_late", text, (), 0.5))
+    counted = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(steps / period)))])
+    even = np.polynomial.Polynomial.fit(counted, measured.stamp, 1)
+    off = float(np.max(np.abs(measured.stamp - even(counted))))
+    if off > OFF_PACE * period:
+        text = (
+            f"The stamps of {log} leave the board's even pace by up to {1e3 * off:.2g} ms: the computer was busy while "
+            "it learnt the board's clock. Effects that are smaller than this delay are not told from it."
+        )
+        found.append(Limitation("off_pace", text, (), 0.8))
+    return found
 
 
 def _came_late(data: TopicData) -> bool:
