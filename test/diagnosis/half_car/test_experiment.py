@@ -15,6 +15,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, Experiment, design_experiment
 from pneumo_ros.diagnosis.half_car.signals import Signals
+from pneumo_ros.diagnosis.report.steps import next_steps
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.state import Search
@@ -83,3 +84,30 @@ def test_what_would_tell_nothing_is_not_offered(
     notes = [note for note in found.notes if "no experiment is offered" in note]
     assert (found.experiment is not None) == (separation >= SEPARATES) == (not notes)
     assert all("of 10 road and valve profiles" in note and "by hand" in note for note in notes)
+
+
+@pytest.mark.parametrize("second_tells", [True, False])
+def test_where_the_strongest_rival_cannot_be_split_off_the_next_one_is(
+    searched: tuple[Search, list[Signals]], second_tells: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of three that a log does not tell apart one may be told; what is refused is refused for the strongest."""
+    search, (first, second) = searched
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.compete", lambda *_: search)
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.grow", lambda *_: None)
+    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.ambiguity_group", lambda *_: KEPT)
+    nothing, time, asked = np.zeros((2, 4)), np.array([0.0, 0.1]), []
+
+    def design(problem: Problem, best: Fit, rival: Fit) -> Experiment:
+        asked.append(rival.candidate.parts[0][0])
+        separation = 7.0 if second_tells and len(asked) == 2 else 0.1 * len(asked)
+        return Experiment(f"number {len(asked)}", "sweep", separation, 0.0, time, nothing[:, :2], nothing)
+
+    found = diagnose(search.problem.model, [first], second, replace(RIVALS, experiment=design))
+    assert sorted(asked) == ["orifice_coefficient", "valve_lag"]
+    if not second_tells:
+        assert found.experiment is None
+        assert any("number 1, would drive the rivals 0.1 standard" in note for note in found.notes)
+        return
+    assert found.experiment is not None and found.experiment.splits == ("leak", asked[1])
+    step = next_steps({"verdict": "leak", "probability": 0.5, "next_experiment": found.experiment.to_json()})[0]
+    assert step.text.startswith(f"Split leak from {asked[1].replace('_', ' ')}: sweep."), step.text

@@ -285,3 +285,17 @@ def test_laws_of_one_family_are_told_apart_in_the_ranking() -> None:
         "lag (the input force)",
         "none",
     ]
+
+
+def test_the_second_experiment_is_another_log_and_another_folder(tmp_path: Path) -> None:
+    """What was played is given already, or is there: its name is not offered again, nor the report's folder."""
+    summary = {"verdict": "leak", "probability": 0.5, "next_experiment": {"description": "a sweep"}}
+    logs, report = (tmp_path / "fit.mcap", tmp_path / "second.mcap"), tmp_path / "report"
+    (tmp_path / "third.mcap").touch()
+    played, diagnosed = next_steps(summary, Asked(logs, None, report))[0].commands
+    assert played.endswith(f"--output {tmp_path / 'fourth.mcap'}")
+    assert f"{logs[0]} {logs[1]} {tmp_path / 'fourth.mcap'} --output {report}-2" in diagnosed
+    for name in ("report", "report-2"):
+        (tmp_path / name).mkdir()
+    _, again = next_steps(summary, Asked(logs, None, tmp_path / "report-2"))[0].commands
+    assert again.endswith(f"--output {report}-3")
