@@ -337,12 +337,15 @@ def _next_experiment(
 
     A group of three is worth an experiment that rids it of one. What is refused is refused for the strongest.
     """
-    names = [(name_of(s.fit.candidate), s) for s in outcome.finalists]
-    rivals = [s for name, s in names if name in group and name != opinion.verdict]
+    rivals: dict[str, Fit] = {}
+    for one in sorted(outcome.finalists, key=lambda s: s.level):
+        name = name_of(one.fit.candidate)
+        if name in group and name != opinion.verdict:
+            rivals.setdefault(name, one.fit)
     first: NextExperiment | None = None
-    for rival in sorted(rivals, key=lambda s: s.level)[:RIVALS]:
-        found = design(outcome.problem, outcome.best, rival.fit)
-        found = None if found is None else replace(found, splits=(opinion.verdict, name_of(rival.fit.candidate)))
+    for name, rival in list(rivals.items())[:RIVALS]:
+        found = design(outcome.problem, outcome.best, rival)
+        found = None if found is None else replace(found, splits=(opinion.verdict, name))
         if found is not None and found.tells:
             return found
         first = first or found

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from helpers.own_logs import QUICK, drawn, log
 
-from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.diagnose import Options, _next_experiment, diagnose
 from pneumo_ros.diagnosis.experiment import SEPARATES
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
@@ -87,27 +89,29 @@ def test_what_would_tell_nothing_is_not_offered(
 
 
 @pytest.mark.parametrize("second_tells", [True, False])
-def test_where_the_strongest_rival_cannot_be_split_off_the_next_one_is(
-    searched: tuple[Search, list[Signals]], second_tells: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_where_the_strongest_rival_cannot_be_split_off_the_next_one_is(second_tells: bool) -> None:
     """Of three that a log does not tell apart one may be told; what is refused is refused for the strongest."""
-    search, (first, second) = searched
-    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.compete", lambda *_: search)
-    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.grow", lambda *_: None)
-    monkeypatch.setattr("pneumo_ros.diagnosis.diagnose.ambiguity_group", lambda *_: KEPT)
     nothing, time, asked = np.zeros((2, 4)), np.array([0.0, 0.1]), []
 
-    def design(problem: Problem, best: Fit, rival: Fit) -> Experiment:
+    def finalist(effect: str, level: float) -> Any:
+        return SimpleNamespace(level=level, fit=SimpleNamespace(candidate=Candidate(((effect, "front"),))))
+
+    def design(problem: Any, best: Any, rival: Any) -> Experiment:
         asked.append(rival.candidate.parts[0][0])
         separation = 7.0 if second_tells and len(asked) == 2 else 0.1 * len(asked)
         return Experiment(f"number {len(asked)}", "sweep", separation, 0.0, time, nothing[:, :2], nothing)
 
-    found = diagnose(search.problem.model, [first], second, replace(RIVALS, experiment=design))
-    assert sorted(asked) == ["orifice_coefficient", "valve_lag"]
+    finalists = [finalist("valve_lag", 3.0), finalist("leak", 1.0), finalist("orifice_coefficient", 2.0)]
+    outcome: Any = SimpleNamespace(
+        finalists=[*finalists, finalist("orifice_coefficient", 2.5)], problem=None, best=None
+    )
+    found = _next_experiment(outcome, cast("Any", SimpleNamespace(verdict="leak")), KEPT, design)
+    assert asked == ["orifice_coefficient", "valve_lag"] and found is not None
     if not second_tells:
-        assert found.experiment is None
-        assert any("number 1, would drive the rivals 0.1 standard" in note for note in found.notes)
+        assert (
+            found.splits == ("leak", "orifice_coefficient") and "would drive the rivals 0.1 standard" in found.refusal
+        )
         return
-    assert found.experiment is not None and found.experiment.splits == ("leak", asked[1])
-    step = next_steps({"verdict": "leak", "probability": 0.5, "next_experiment": found.experiment.to_json()})[0]
-    assert step.text.startswith(f"Split leak from {asked[1].replace('_', ' ')}: sweep."), step.text
+    assert found.splits == ("leak", "valve_lag")
+    step = next_steps({"verdict": "leak", "probability": 0.5, "next_experiment": found.to_json()})[0]
+    assert step.text.startswith("Split leak from valve lag: sweep."), step.text
