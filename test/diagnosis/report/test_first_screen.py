@@ -243,6 +243,15 @@ def test_every_row_of_a_table_stands_under_its_heads(tmp_path: Path, width: int)
             "const shown = row => [...row.cells].filter(cell => cell.offsetWidth);"
             "return [...document.querySelectorAll('tr')].map(row => shown(row).map(cell => cell.offsetTop))"
         )
+        bars = tab.driver.execute_script(
+            "return [...document.querySelectorAll('.rung > *')].map(one => [one.className, one.offsetWidth, "
+            "one.getBoundingClientRect().right, one.textContent])"
+        )
+    gap = findings().summary["gap"]
+    assert [text for name, _, _, text in bars if name == "value"][:2] == [
+        f"{gap[key]:.3g}" for key in ("nominal", "refit")
+    ]
+    assert all(wide > 0 and right <= width for _, wide, right, _ in bars), "a bar and its number are on the screen"
     assert len(rows) > 5
     for tops in rows:
         assert len(set(tops)) <= 1, "the cells of a row stand side by side"
