@@ -68,6 +68,15 @@ def test_a_law_of_another_kind_is_as_big_as_its_measured_curve() -> None:
     assert facts["how big"] == "leak as measured, flow over pressure: 4 g/s at 200 kPa, 10 g/s at 300 kPa"
 
 
+def test_a_busy_computer_stands_beside_the_verdict() -> None:
+    """What may come from the time base is read before anybody takes a valve out; other notes stay in the report."""
+    found, known = findings(), Known(LIBRARY)
+    late = "fit.mcap: The openings were 5 ms late: the computer was busy."
+    summary = {**found.summary, "notes": ["another note", late, late]}
+    assert dict(story(summary, known).facts)["timing"] == late
+    assert "timing" not in dict(story(found.summary, known).facts)
+
+
 def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
     found = findings()
     said = story(found.summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))

@@ -74,7 +74,7 @@ def prepare(
     clean = _one_clock(topics, name, limits)
     grid, period = _grid(clean, name, limits, events)
     if APPLIED in clean and DISPLACEMENT in clean:
-        limits += check_pace(clean[ROAD], clean[DISPLACEMENT], name)
+        limits += check_pace(clean[ROAD], clean[DISPLACEMENT], clean[APPLIED], name)
     commands, road = _inputs(clean, grid, period, rig, name, limits)
     check_road_unit(road, name)
     measured, weight, noise, stated = _measured(clean, grid, commands, rig, name, limits)

@@ -90,6 +90,18 @@ def test_a_busy_computer_is_told_where_the_stamps_leave_the_boards_pace(tripped:
     assert "road_late" not in codes(prepare({**foreign, ROAD: road._replace(stamp=road.stamp + 0.012)}, load_rig()))
 
 
+def test_openings_that_went_out_late_are_told(tripped: Topics) -> None:
+    """One in fifty is sent five milliseconds late, as by a computer with other work; in shut valves it is nothing."""
+    sent = tripped[APPLIED]
+    late = np.where(np.arange(len(sent.stamp)) % 50 == 0, 0.005, 0.0)
+    busy = prepare({**tripped, APPLIED: sent._replace(stamp=np.maximum.accumulate(sent.stamp + late))}, load_rig())
+    assert "One opening in 100" in said(busy, "openings_uneven") and "not 2 ms" in said(busy, "openings_uneven")
+    assert busy.confidence_cap <= 0.5
+    even = {**sent.channels, "front_inlet": np.zeros(len(late))}
+    shut = sent._replace(stamp=sent.stamp + late, channels={name: 0.0 * values for name, values in even.items()})
+    assert "openings_uneven" not in codes(prepare({**tripped, APPLIED: shut}, load_rig()))
+
+
 def test_events_of_other_nodes_cut_nothing(tripped: Topics) -> None:
     without = {topic: data for topic, data in tripped.items() if topic != APPLIED}
     told = prepare(without, load_rig(), events=[LoggedEvent(4.0, 2, "plant", "trip")])
