@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.rig_logs import signals_of, simulated
 from scipy.optimize import lsq_linear
 
+from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.contract import Effect, Ends, Inputs
 from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.shapes import tyre as tyres
 from pneumo_ros.effects.shapes.families import SHAPES
@@ -123,10 +126,26 @@ def test_a_load_brings_its_inertia_and_a_shift() -> None:
     nominal = model.plant(model_centre(model), ()).body
     shape = SHAPES["payload.shape"]
     assert shape.plant is not None
-    changed = shape.plant(model.plant(model_centre(model), ()), Ends(True, True), (0.3, 0.01)).body
+    changed = shape.plant(model.plant(model_centre(model), ()), Ends(True, True), (0.3, 0.01, 0.0)).body
     assert changed.pitch_inertia == pytest.approx(nominal.pitch_inertia + 0.3)
     assert changed.front_arm + changed.rear_arm == pytest.approx(nominal.front_arm + nominal.rear_arm)
     assert nominal.front_arm - changed.front_arm == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("effect", "values"), [("payload.shape", (0.0, 0.0)), ("cg_shift.shape", (0.0,))])
+def test_what_tips_presses_with_a_moment_in_proportion_to_pitch(effect: str, values: tuple[float, ...]) -> None:
+    """k (z_f - z_r) on either end is k L^2 a radian, and as a moment of that size it moves the rig."""
+    model, log = RigModel(load_rig()), signals_of(*simulated(seconds=4.0))
+    body, stiffness = model.plant().body, 400.0  # N/m
+    wheelbase = body.front_arm + body.rear_arm
+    tipping = Active(effect, "", (*values, stiffness))
+    firm, tipped = model.states(log), model.states(log, active=(tipping,))
+    assert np.ptp(tipped[:, 1]) > 1.02 * np.ptp(firm[:, 1])  # it tips further
+    moment = np.zeros((len(log.commands), len(CORRECTIONS)))
+    held = 0.5 * (tipped[:-1, 1] + tipped[1:, 1]) - tipped[0, 1]  # over each period
+    moment[:-1, CORRECTIONS.index("body_pitch")] = stiffness * wheelbase**2 * held
+    same = model.states(log, correction=moment)
+    assert np.abs(same[:, 1] - tipped[:, 1]).max() < 0.01 * np.abs(firm[:, 1] - tipped[:, 1]).max()
 
 
 def model_centre(model: RigModel) -> np.ndarray:
