@@ -15,7 +15,9 @@ from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.shapes import tyre as tyres
 from pneumo_ros.effects.shapes.families import SHAPES
+from pneumo_ros.effects.shapes.force import SLACKS
 from pneumo_ros.effects.shapes.signals import RESTS
+from pneumo_ros.laws.friction import slid
 from pneumo_ros.rig import load_rig
 
 PERIOD = 2e-3  # s
@@ -84,6 +86,26 @@ def test_friction_that_saturates_late_and_a_damper_that_opens_early_are_the_same
             seen = (Strut(0.0457, float(v), 2.5e5, 1.6e-3, 0.0, 0.0, 0.0) for v in rate)
             atoms.append([force(one, (0.0,) * 8, p) for one in seen])
         assert left_of(np.array(atoms).T, signs(shape), law, rate[:, None]) < 0.1, family
+
+
+def test_sliders_of_all_lengths_are_a_hysteresis() -> None:
+    """Slip forces of a power law up to 5 mm (Segalman 2005), most of them short: not friction beside a hysteresis."""
+    time = np.arange(6000) * PERIOD
+    moved = np.diff(3e-3 * np.sin(7.0 * time) + 1.5e-3 * np.sin(17.3 * time), prepend=0.0)
+    slacks = np.linspace(2e-5, 5e-3, 250)
+    force = slacks**0.2  # that each slips at
+    atoms = [s for s in SLACKS if f"slider {s:g} m" in [p.name for p in SHAPES["bellows_hysteresis.shape"].parameters]]
+
+    def slipped(slack: float) -> np.ndarray:
+        z = np.zeros(len(moved) + 1)
+        for i, step in enumerate(moved):
+            z[i + 1] = slid(z[i], step / slack)
+        return z[1:]
+
+    law = np.sum([f * slipped(s) for f, s in zip(force, slacks, strict=True)], axis=0)
+    table = np.column_stack([slipped(s) for s in atoms])
+    whole, longer = (left_of(t, [False] * t.shape[1], law, np.zeros((len(law), 0))) for t in (table, table[:, 1:]))
+    assert min(atoms) == SLACKS[1] and whole < 0.1 < longer
 
 
 @pytest.mark.parametrize("channel", [0, 3, 4])
