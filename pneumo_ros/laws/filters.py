@@ -153,6 +153,25 @@ def play(u: Array, half: float, memory: float | None = None) -> tuple[Array, flo
 
 
 @njit(cache=True, nogil=True)
+def stuck(u: Array, band: float, held: float) -> Array:
+    """What stays until its input (N,) is ``band`` away, then jumps to it (Choudhury, Thornhill, Shah 2005, Control
+    Engineering Practice 13, 641-658: slip jump as large as the stick band).
+    """
+    y = np.empty_like(u)
+    for i in range(u.shape[0]):
+        if abs(u[i] - held) >= band:
+            held = u[i]
+        y[i] = held
+    return y
+
+
+def stick(u: Array, band: float, memory: float | None = None) -> tuple[Array, float]:
+    """:func:`stuck` of a block; at rest at its first sample before."""
+    y = stuck(np.ascontiguousarray(u), band, float(u[0]) if memory is None else memory)
+    return y, float(y[-1])
+
+
+@njit(cache=True, nogil=True)
 def followed(u: Array, up: float, down: float, most: float, held: float) -> Array:
     """What follows its input (N,) by a share of the way, one up and one down, and by at most so much a sample."""
     y = np.empty_like(u)

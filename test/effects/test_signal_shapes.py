@@ -55,6 +55,25 @@ def test_a_follower_has_a_lag_each_way_and_a_rate_limit() -> None:
     assert np.argmax(limited >= 0.0099) * PERIOD == pytest.approx(0.495, abs=2 * PERIOD)
 
 
+def test_a_spool_sticks_until_its_command_is_a_band_away_then_jumps_to_it() -> None:
+    command = 1e-6 + 3e-7 * np.sin(np.arange(2000) * 0.01)
+    shape, band = SHAPES["valve_deadband.shape"], 1e-7
+    values = tuple({"sticking": 1.0, "band": band}.get(p.name, 0.0) for p in shape.parameters)
+    given = Inputs(np.tile(command[:, None], (1, 4)), np.zeros((2001, 2)))
+    assert shape.inputs is not None
+    whole = shape.inputs(given, 2e-3, Ends(True, False), values, None)[0].commands
+    moved = np.flatnonzero(np.diff(whole[:, 0]))
+    assert np.all(whole[moved + 1, 0] == command[moved + 1])  # it jumps to the command
+    assert np.abs(np.diff(whole[:, 0])[moved]).min() >= band and np.abs(whole[:, 0] - command).max() < band
+    assert np.array_equal(whole[:, 1:], given.commands[:, 1:])  # the other inlet and the outlets are as they were
+    memory, parts = None, []
+    for rows in (slice(0, 700), slice(700, 701), slice(701, 2000)):
+        block, memory = shape.inputs(Inputs(given.commands[rows], given.road[rows]), 2e-3, Ends(True, False), values,
+                                     memory)  # fmt: skip
+        parts.append(block.commands)
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
 def test_an_exponent_lower_by_d_takes_its_share_of_the_squeeze() -> None:
     n, volume, pressure, rate = 1.4, 3e-4, 3e5, -1e-3
     gas = Air(pressure, 0.0457, rate, volume, 293.0, 0.0, 0.0, n, 293.0, 0.0, 6e5)

@@ -5,14 +5,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.rig_logs import signals_of, simulated
 from scipy.optimize import lsq_linear
 
+from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.contract import Effect, Ends, Inputs
 from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.shapes import tyre as tyres
 from pneumo_ros.effects.shapes.families import SHAPES
+from pneumo_ros.effects.shapes.force import SLACKS
 from pneumo_ros.effects.shapes.signals import RESTS
+from pneumo_ros.laws.friction import slid
 from pneumo_ros.rig import load_rig
 
 PERIOD = 2e-3  # s
@@ -83,6 +88,26 @@ def test_friction_that_saturates_late_and_a_damper_that_opens_early_are_the_same
         assert left_of(np.array(atoms).T, signs(shape), law, rate[:, None]) < 0.1, family
 
 
+def test_sliders_of_all_lengths_are_a_hysteresis() -> None:
+    """Slip forces of a power law up to 5 mm (Segalman 2005), most of them short: not friction beside a hysteresis."""
+    time = np.arange(6000) * PERIOD
+    moved = np.diff(3e-3 * np.sin(7.0 * time) + 1.5e-3 * np.sin(17.3 * time), prepend=0.0)
+    slacks = np.linspace(2e-5, 5e-3, 250)
+    force = slacks**0.2  # that each slips at
+    atoms = [s for s in SLACKS if f"slider {s:g} m" in [p.name for p in SHAPES["bellows_hysteresis.shape"].parameters]]
+
+    def slipped(slack: float) -> np.ndarray:
+        z = np.zeros(len(moved) + 1)
+        for i, step in enumerate(moved):
+            z[i + 1] = slid(z[i], step / slack)
+        return z[1:]
+
+    law = np.sum([f * slipped(s) for f, s in zip(force, slacks, strict=True)], axis=0)
+    table = np.column_stack([slipped(s) for s in atoms])
+    whole, longer = (left_of(t, [False] * t.shape[1], law, np.zeros((len(law), 0))) for t in (table, table[:, 1:]))
+    assert min(atoms) == SLACKS[1] and whole < 0.1 < longer
+
+
 @pytest.mark.parametrize("channel", [0, 3, 4])
 def test_a_sensor_with_another_sensitivity_on_one_side_of_its_rest(channel: int) -> None:
     name = "pressure_scale.shape" if channel > 3 else "lvdt_scale.shape"
@@ -123,10 +148,26 @@ def test_a_load_brings_its_inertia_and_a_shift() -> None:
     nominal = model.plant(model_centre(model), ()).body
     shape = SHAPES["payload.shape"]
     assert shape.plant is not None
-    changed = shape.plant(model.plant(model_centre(model), ()), Ends(True, True), (0.3, 0.01)).body
+    changed = shape.plant(model.plant(model_centre(model), ()), Ends(True, True), (0.3, 0.01, 0.0)).body
     assert changed.pitch_inertia == pytest.approx(nominal.pitch_inertia + 0.3)
     assert changed.front_arm + changed.rear_arm == pytest.approx(nominal.front_arm + nominal.rear_arm)
     assert nominal.front_arm - changed.front_arm == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("effect", "values"), [("payload.shape", (0.0, 0.0)), ("cg_shift.shape", (0.0,))])
+def test_what_tips_presses_with_a_moment_in_proportion_to_pitch(effect: str, values: tuple[float, ...]) -> None:
+    """k (z_f - z_r) on either end is k L^2 a radian, and as a moment of that size it moves the rig."""
+    model, log = RigModel(load_rig()), signals_of(*simulated(seconds=4.0))
+    body, stiffness = model.plant().body, 400.0  # N/m
+    wheelbase = body.front_arm + body.rear_arm
+    tipping = Active(effect, "", (*values, stiffness))
+    firm, tipped = model.states(log), model.states(log, active=(tipping,))
+    assert np.ptp(tipped[:, 1]) > 1.02 * np.ptp(firm[:, 1])  # it tips further
+    moment = np.zeros((len(log.commands), len(CORRECTIONS)))
+    held = 0.5 * (tipped[:-1, 1] + tipped[1:, 1]) - tipped[0, 1]  # over each period
+    moment[:-1, CORRECTIONS.index("body_pitch")] = stiffness * wheelbase**2 * held
+    same = model.states(log, correction=moment)
+    assert np.abs(same[:, 1] - tipped[:, 1]).max() < 0.01 * np.abs(firm[:, 1] - tipped[:, 1]).max()
 
 
 def model_centre(model: RigModel) -> np.ndarray:

@@ -162,7 +162,7 @@ def diagnose_files(
 
 def left_in_equations(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Equations:
     """What structures leave in the held-out log's equations: :data:`pneumo_ros.diagnosis.diagnose.HoldEquations`."""
-    return held_equations(model, fit, holdout).left
+    return held_equations(model, fit, holdout)
 
 
 def flexible_search(

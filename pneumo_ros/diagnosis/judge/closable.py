@@ -18,7 +18,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in, mean_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
@@ -61,8 +61,8 @@ class EffectEvidence:
         no such place is known
     follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
         follows, over the least that this kind of error leaves; infinite where nothing is asked
-    missing : what the structure leaves in the equations along the held-out log, and what is left there without the
-        effect, mean squares in null variances; None where nobody looked, or where the tolerances answer for it
+    missing : what the structure leaves in the equations that the effect acts in, along the held-out log, and what is
+        left there without it, mean squares in null variances; None where nobody looked, or the tolerances answer for it
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -165,8 +165,7 @@ def closable(
     floor : gap that sensors and the model's stated form leave, as the contract's gap
     refit : held-out gap of the refit, as the contract's
     places : further places of the contract where something may be missing, the likeliest first
-    equations : what a structure leaves in the rig's equations along the held-out log, see
-        :data:`pneumo_ros.diagnosis.judge.equations.Equations`
+    equations : the rig's equations along the held-out log
     """
     left = held_by(problem, best, holdout).total
     own = _above(left, floor)
@@ -181,7 +180,7 @@ def closable(
     elsewhere = exchanges({law: _elsewhere(problem, law, much) for law in best.candidate.laws})
     instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
 
-    still = 0.0 if equations is None else left_in(equations, problem, best)
+    still = None if equations is None else left_in(equations, problem, best)
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
@@ -190,7 +189,10 @@ def closable(
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         # The equations estimate the tolerances anew: where these answer for the effect, they do so there as well.
         answered = problem.strains(bare.x) and not problem.strains(best.x)
-        missing = None if equations is None or answered else (still, left_in(equations, problem, bare))
+        missing = None
+        if equations is not None and still is not None and not answered:
+            acting = equations.of(at[law])
+            missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,

@@ -7,16 +7,29 @@ found out where its forces and flows are not those of the rig.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, Protocol
 
-from pneumo_ros.arrays import Array
+import numpy as np
+
+from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.effects.parameters import Active
 
-# (nuisance values, effects) -> mean square that they leave in the equations along the held-out log, null variances
-Equations = Callable[[Array, tuple[Active, ...]], float]
+
+class Equations(Protocol):
+    """The equations of a rig along its held-out log."""
+
+    def left(self, nuisance: Array, active: Sequence[Active]) -> Array:
+        """Mean square, null variances, that (P,) tolerances and effects leave in each equation, (E,)."""
+        ...
+
+    def of(self, places: Sequence[str]) -> Mask:
+        """Which equations something at some places of the contract acts in, (E,)."""
+        ...
+
+
 # Mean square, null variances, that noise, tolerances and model form leave anyway [definition]
 EXPLAINED: Final = 1.0
 # Mean square above that, from which on the equations show a gap: rigs without one leave up to 0.6 [taste]
@@ -32,6 +45,14 @@ def kept(left: float, before: float) -> float:
     return max(left - EXPLAINED, 0.0) / max(before - EXPLAINED, SHOWN)
 
 
-def left_in(equations: Equations, problem: Problem, one: Fit) -> float:
-    """Mean square that a structure leaves in the equations, null variances."""
-    return equations(problem.nuisance(one.x), problem.active(one.candidate, problem.values(one.candidate, one.x)))
+def left_in(equations: Equations, problem: Problem, one: Fit) -> Array:
+    """Mean square that a structure leaves in each equation, (E,), null variances."""
+    return equations.left(problem.nuisance(one.x), problem.active(one.candidate, problem.values(one.candidate, one.x)))
+
+
+def mean_in(left: Array, acting: Mask) -> float:
+    """Mean square left in the equations that something acts in; in all where it acts in none.
+
+    What is missing in the others says nothing of it: one sensor that is late may fill all of them.
+    """
+    return float(np.mean(left[acting])) if np.any(acting) else float(np.mean(left))

@@ -37,7 +37,7 @@ def harmful(problem: Problem, best: Fit, holdout: Record, equations: Equations |
     ----------
     problem, best : the structure, fitted to all blocks
     holdout : the held-out record
-    equations : what a structure leaves in the rig's equations along it, where these are known
+    equations : the rig's equations along it, where these are known
     """
 
     def left(one: Fit) -> tuple[float, float]:
@@ -45,7 +45,7 @@ def harmful(problem: Problem, best: Fit, holdout: Record, equations: Equations |
         gap = np.inf if one.diverged else held_by(problem, one, holdout).total
         if not np.isfinite(gap):
             return np.inf, np.inf
-        return gap, 0.0 if equations is None else left_in(equations, problem, one)
+        return gap, 0.0 if equations is None else float(np.mean(left_in(equations, problem, one)))
 
     gone: list[Part] = []
     while len(best.candidate.laws) > 1:

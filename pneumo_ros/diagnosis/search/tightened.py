@@ -16,7 +16,7 @@ from typing import Final
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.search.competition import compete, room_for_more
 from pneumo_ros.diagnosis.search.growth import grow
-from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.selection import THIRD, Thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Search
 
 TIGHTNESS: Final = 10.0  # times the weight that the tolerances have in the second search [taste]
@@ -29,11 +29,12 @@ EFFORT: Final = Effort(singles=6, finalists=3, seconds=(3,), blind_pairs=2, pair
 def search_tightened(search: Search, limits: Thresholds) -> None:
     """Add to ``search.structures`` what a search with tight tolerances finds, fitted with the tolerances as told.
 
-    Nothing where the best structure leaves its tolerances alone and little besides, or leaves nothing to find.
+    Nothing where the best structure leaves its tolerances alone and little besides, or leaves nothing to find. What one
+    of three effects and more leaves is no reason: laws that nobody wrote leave as much together.
     """
     problem, refit = search.problem, score(search.problem, search.refit)
     best = select(refit, [score(problem, one) for one in search.finalists], limits)
-    much = best.level > max(MUCH, MUCH_OF_REFIT * refit.level)
+    much = best.size < THIRD and best.level > max(MUCH, MUCH_OF_REFIT * refit.level)
     if not (much or (best.size and problem.strains(best.fit.x))) or not room_for_more(search):
         return
 

@@ -127,7 +127,7 @@ EFFECTS = (
     ),
     FORCE.shape(
         "bellows_hysteresis",
-        [*(f"slider {s:g} m" for s in SLACKS[2:]), "deep"],
+        [*(f"slider {s:g} m" for s in SLACKS[1:]), "deep"],
         "hysteresis of any law: sliders of every length, some of which hold the better the deeper the spring is",
     ),
     FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height and may damp"),

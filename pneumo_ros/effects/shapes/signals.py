@@ -3,8 +3,9 @@
 
 A slow part is a mixture of lags and delays with nonnegative shares, and one follower whose rate limit and two lags are
 fitted (mixtures of limits are not like a limit between them); a dead zone takes away ramps that end at a corner, and
-what a play of some width does not pass; a sensor's error is a polynomial of its own reading; its
-zero creeps from where it stood when the log began, by exponentials of every length.
+what a play of some width does not pass, and one spool that sticks and jumps, whose band is fitted for the same reason;
+a sensor's error is a polynomial of its own reading; its zero creeps from where it stood when the log began, by
+exponentials of every length.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from pneumo_ros.effects.contract import (
 )
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
-from pneumo_ros.laws.filters import delayed_hold, first_order_line, followed, lagged_hold, play
+from pneumo_ros.laws.filters import delayed_hold, first_order_line, followed, lagged_hold, play, stick
 from pneumo_ros.laws.signal import bent, crept, dead
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
@@ -68,6 +69,10 @@ def _play(half: float) -> Filter:
     return lambda u, period, memory: play(u, half, memory)
 
 
+def _stick(band: float) -> Filter:
+    return lambda u, period, memory: stick(u, band, memory)
+
+
 def _follow(slew: float, rising: float, falling: float) -> Filter:
     """A part of first order, with a lag on the way up and another on the way down, no faster than ``slew``."""
 
@@ -100,20 +105,24 @@ def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParam
 
 
 def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
-           follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
-    """A valve's shape; a follower's share, rate limit and lags come last."""
+           fitted: tuple[EffectParameter, ...] = (), made: Callable[..., Filter] | None = None,
+           alone: bool = False) -> Effect:  # fmt: skip
+    """A valve's shape; one filter whose numbers are fitted is ``made`` of the last parameters, after its share, and
+    tried ``alone`` as well.
+    """
 
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
         columns = [c for end in ends.columns for c in ((end,) if inlets_only else (end, 2 + end))]
-        count = len(names) + (1 if follower else 0)
-        shares, own = values[:count], [*filters, *([_follow(*values[count:])] if follower else [])]
+        count = len(names) + (0 if made is None else 1)
+        shares, own = values[:count], [*filters, *([] if made is None else [made(*values[count:])])]
         commands, memory = by_column(
             lambda u, kept: mixed(own, u, period, shares, kept), given.commands, columns, memory
         )
         return given._replace(commands=np.maximum(commands, 0.0)), memory
 
-    parameters = (*_shares(names, name.startswith("anything")), *follower)
-    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs)
+    parameters = (*_shares(names, name.startswith("anything")), *fitted)
+    screened = (len(names),) if alone else ()
+    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened)
 
 
 def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -212,12 +221,15 @@ ONE_WAY = [_follow(math.inf, *pair) for t in UNEVEN for pair in ((t, QUICK), (QU
 ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c in PLAYS)]
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
+STICKING = (*_shares(["sticking"]),
+            EffectParameter("band", "m2", 1e-8, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
            [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
-           _follower("m2/s", 1.5e-6, 3e-5)),
+           _follower("m2/s", 1.5e-6, 3e-5), _follow),
     _valve("transport_delay.shape", "commands that come late by delays of many lengths", DELAY_NAMES, LATE, False),
-    _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play", ZONE_NAMES, ZONES, True),
+    _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play, or a spool that sticks and jumps",
+           ZONE_NAMES, ZONES, True, STICKING, _stick, alone=True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
     Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),

@@ -40,7 +40,7 @@ def test_what_only_the_fitted_log_had_is_taken_away(model: RigModel, zero: float
     fit_log = log(model, 1, nuisance, (damped, off))
     held = log(model, 2, nuisance, (damped, off) if zero == 0.0 else (damped,))
     problem = Problem(model, (fit_log,))
-    equations = held_equations(model, (fit_log,), held).left
+    equations = held_equations(model, (fit_log,), held)
     assert harmful(problem, both(problem), held, equations) == (() if zero == 0.0 else (OFFSET,))
 
 

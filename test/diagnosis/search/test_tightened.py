@@ -91,11 +91,21 @@ def test_tightness_weighs_the_tolerances_and_nothing_else() -> None:
     assert np.array_equal(tight[:4], TIGHTNESS * told[:4]) and np.array_equal(tight[4:], told[4:])
 
 
+class Unmoved:
+    """Two equations that no effect moves."""
+
+    def left(self, nuisance: np.ndarray, active: Sequence[Active]) -> np.ndarray:
+        return np.array([5.0, 5.0])
+
+    def of(self, places: Sequence[str]) -> np.ndarray:
+        return np.array([True, False])
+
+
 @pytest.mark.parametrize("name, asked", [("load", False), ("other", True)])
 def test_equations_are_not_asked_for_what_the_tolerances_answer(name: str, asked: bool) -> None:
     search = searched(name, 0.8)
     problem = search.problem
     best = next(one for one in search.finalists if one.candidate.laws == ((name, ""),))
-    told = closable(problem, best, problem.records[0], 0.02, 0.5, (), lambda nuisance, active: 5.0)
+    told = closable(problem, best, problem.records[0], 0.02, 0.5, (), Unmoved())
     (evidence,) = told.effects
     assert evidence.missing == ((5.0, 5.0) if asked else None)

@@ -28,6 +28,7 @@ MODEL_FORM: Final = 5e-4
 NOISE_DRAWS: Final = 4  # draws of sensor noise that its residuals are estimated from [numerics]
 PARAMETER_STEP: Final = 0.5  # prior sigmas, forward difference of a parameter [numerics]
 FIRST_SENSOR_STEP: Final = 0.05  # share of a sensor shape's unit, forward difference [numerics]
+DENSE: Final = 0.9  # share of a channel's usual samples that a window must have [taste]
 # Channels that an equation reads [definition]
 FEEDS: Final = {
     "heave": MEASURED,
@@ -169,14 +170,19 @@ def model_form(car: HalfCar, features: Features) -> Array:
 
 
 def window_weights(signals: Signals, windows: Windows) -> Array:
-    """(K, 6) 1 for a window in which each channel that the equation needs is sampled as densely as it is overall."""
+    """(K, 6) 1 for a window in which each channel that the equation needs is sampled as densely as it is overall.
+
+    Under the window and its derivatives alike: these weigh a gap at the window's edge, where it is small itself.
+    """
     out = np.ones((len(windows.centres), len(EQUATIONS)))
-    present = np.column_stack([averaged(signals.weight[:, c], windows.window.value, windows.centres) for c in range(6)])
-    usual = np.maximum(np.median(present, axis=0), 1e-9)
-    for e, equation in enumerate(EQUATIONS):
-        for channel in FEEDS[equation]:
-            c = MEASURED.index(channel)
-            out[:, e] *= present[:, c] > 0.9 * usual[c]
+    kernels = [np.abs(kernel) / np.sum(np.abs(kernel)) for kernel in windows.window[:3]]
+    for kernel in kernels:
+        present = np.column_stack([averaged(signals.weight[:, c], kernel, windows.centres) for c in range(6)])
+        usual = np.maximum(np.median(present, axis=0), 1e-9)
+        for e, equation in enumerate(EQUATIONS):
+            for channel in FEEDS[equation]:
+                c = MEASURED.index(channel)
+                out[:, e] *= present[:, c] > DENSE * usual[c]
     return out
 
 

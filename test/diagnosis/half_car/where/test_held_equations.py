@@ -11,6 +11,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.diagnosis.half_car.where import held_equations, locate
+from pneumo_ros.diagnosis.half_car.where.weak import EQUATIONS
 from pneumo_ros.diagnosis.judge.equations import SHOWN, kept
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -50,7 +51,7 @@ def test_a_wrong_name_does_not_act_in_the_equations_and_the_right_one_does(model
 
     def left(one: Fit) -> float:
         active = problem.active(one.candidate, problem.values(one.candidate, one.x))
-        return equations.left(problem.nuisance(one.x), active)
+        return float(np.mean(equations.left(problem.nuisance(one.x), active)))
 
     refit, named = fitted(problem, (), ()), fitted(problem, (OFFSET,), (2e3,))
     right = fitted(problem, (("anything.air", "rear"),), icing(model))
@@ -63,10 +64,44 @@ def test_it_is_what_the_search_for_places_calls_the_refit(model: RigModel) -> No
     damped = Active("viscous_damping", "both", (40.0, 0.0))
     fit_log, held = rig_with(model, damped)
     nuisance = np.array([p.nominal for p in model.parameters])
-    there = held_equations(model, (fit_log,), held).left(nuisance, ())
+    equations = held_equations(model, (fit_log,), held)
+    there = float(np.mean(equations.left(nuisance, ())))
     assert there == pytest.approx(locate(model, (fit_log,), held).level["refit"] ** 2, rel=0.02)
     assert there > 2.0
-    assert held_equations(model, (fit_log,), held).left(nuisance, (damped,)) < 1.2
+    assert np.mean(equations.left(nuisance, (damped,))) < 1.2
+
+
+def test_a_late_sensor_hides_no_effect_from_the_equations_that_it_does_not_feed(model: RigModel) -> None:
+    """Friction at the front, and a rear pressure that is late: the front axle's equation still tells of it."""
+    friction = Active("coulomb_friction", "front", (6.0, 1e-4, 0.0))
+    late = Active("pressure_lag", "rear_pressure", (0.02, 1.0))
+    fit_log, held = rig_with(model, friction, late)
+    equations = held_equations(model, (fit_log,), held)
+    nuisance = np.array([p.nominal for p in model.parameters])
+    without, own = equations.left(nuisance, ()), equations.left(nuisance, (friction,))
+    front = equations.of(("front_force",))
+    assert kept(float(np.mean(own)), float(np.mean(without))) > 0.9
+    axle = EQUATIONS.index("front_axle")
+    assert front[axle] and kept(float(own[axle]), float(without[axle])) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("places", "acting"),
+    [
+        (("rear_force",), "heave pitch rear_axle"),
+        (("front_tyre",), "front_axle"),
+        (("rear_air",), "rear_air"),
+        (("body_pitch", "body_heave"), "heave pitch"),
+        (("supply",), "front_air rear_air"),
+        (("road_input",), "front_axle rear_axle"),
+        (("sensor:front_pressure",), "heave pitch front_axle front_air"),
+        (("sensor:unsprung_rear",), "heave pitch rear_axle rear_air"),
+    ],
+)
+def test_equations_by_place(model: RigModel, places: tuple[str, ...], acting: str) -> None:
+    fit_log, held = rig_with(model)
+    mask = held_equations(model, (fit_log,), held).of(places)
+    assert " ".join(name for name, on in zip(EQUATIONS, mask, strict=True) if on) == acting
 
 
 def test_a_gap_that_the_equations_hardly_show_is_no_reference() -> None:

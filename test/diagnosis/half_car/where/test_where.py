@@ -273,6 +273,21 @@ def test_a_missing_channel_leaves_the_equations_that_do_not_need_it(model: RigMo
     assert locate(model, [logs[0]], logs[1]).shares[0][0] == "front_air"
 
 
+def test_a_gap_in_the_log_leaves_the_windows_beside_it_as_they_are(model: RigModel) -> None:
+    """Forty milliseconds without samples, filled by straight lines: no window that weighs them counts as a residual."""
+    log = log_with(model, (), 3)
+    lost = slice(2012, 2032)
+    measured, weight = log.measured.copy(), log.weight.copy()
+    for column in range(measured.shape[1]):
+        measured[lost, column] = np.interp(np.arange(2012, 2032), [2011, 2032], measured[[2011, 2032], column])
+    weight[lost] = 0.0
+    whole, holed = design_of(model, log), design_of(model, replace(log, measured=measured, weight=weight))
+    left_out = ~holed.weight.all(axis=1)
+    touched = np.abs(holed.windows.centres - 2021.5) < 30.0
+    assert left_out.any() and not left_out[~touched].any()
+    assert np.abs(holed.residual).max() < 1.2 * np.abs(whole.residual).max()
+
+
 @pytest.mark.parametrize("lost", [("sprung_front",), ("front_pressure",), MEASURED[:4], MEASURED])
 def test_channels_that_are_not_there_do_no_harm(model: RigModel, lost: tuple[str, ...]) -> None:
     """From what is left something finite is said, and a place that needs the lost channel is not blamed."""
