@@ -153,7 +153,8 @@ def _bench(log: Path) -> tuple[str, ...]:
     if daq:
         return ("--source", "serial", *(word for pair in given for word in pair))
     if hidden:
-        return ("--set", f"plant.simulated_rig={hidden}")
+        beside = log.parent / hidden  # the log was made where it lies, and is diagnosed from elsewhere
+        return ("--set", f"plant.simulated_rig={beside if beside.is_file() and not Path(hidden).is_file() else hidden}")
     return ("--source", "sim") if "plant" in nodes else ()
 
 

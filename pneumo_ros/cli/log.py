@@ -40,6 +40,7 @@ _LEVELS = {0: "info", 1: "warning", 2: "error", 3: "stale"}
 _COLOUR = {"ok": "green", "note": "cyan", "warning": "yellow", "error": "red"}
 FINDINGS_EXIT = 1
 _FOR_PROGRAMS = ("rosbag2",)  # metadata that nobody reads
+_TOLD_BELOW = "parameters"  # of the metadata: every node says its own
 _NO_SIGNALS = ("/diagnostics", "/rig/events")
 _SHOWN_AS = {  # SI unit -> factor and the unit whose numbers are short
     "m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m2": (1e6, "mm2"), "Pa": (1e-3, "kPa"), "rad": (1e3, "mrad"),
@@ -249,6 +250,8 @@ def _two_digits(value: float) -> str:
 
 
 def _show_settings(report: Report, start: int) -> None:
+    from pneumo_ros.log.inspection import told_settings
+
     console.print("\n[bold]What explains the run[/]")
     _say("rig", report.rig or "not in the log")
     for key, (nominal, ours) in report.changed_parameters.items():
@@ -258,16 +261,13 @@ def _show_settings(report: Report, start: int) -> None:
     for name, entries in report.metadata:
         if name in _FOR_PROGRAMS:
             continue
-        shown = [f"{key} {_short(value)}" for key, value in entries.items() if value and "\n" not in value]
-        shown += [f"{key} ({len(value)} characters)" for key, value in entries.items() if "\n" in value]
+        plain = {key: value for key, value in entries.items() if key != _TOLD_BELOW}
+        shown = [f"{key} {_short(value)}" for key, value in plain.items() if value and "\n" not in value]
+        shown += [f"{key} ({len(value)} characters)" for key, value in plain.items() if "\n" in value]
         _say(name, ", ".join(shown))
-    before: dict[str, dict[str, object]] = {}
-    for setup in report.setups:
-        known = before.setdefault(setup.node, {})
-        new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
-        word = f"changed at {_seconds(setup.time_ns, start)} s" if known.keys() & new.keys() else "at the start"
-        known.update(new)
-        _say(f"{setup.node} {word}", ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != ""))
+    for time_ns, node, began, new in told_settings(report.setups):
+        word = "at the start" if began else f"changed at {_seconds(time_ns, start)} s"
+        _say(f"{node} {word}", ", ".join(f"{key} {_short(value)}" for key, value in new.items() if value != ""))
     for time_ns, calibration in report.calibrations:
         _say(f"calibration from {_seconds(time_ns, start)} s on", _short(" ".join(calibration.split())))
     for name, size in report.attachments:

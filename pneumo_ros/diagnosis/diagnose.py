@@ -53,6 +53,7 @@ SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does no
 MOSTLY: Final = 0.5
 FEWEST: Final = 16  # rows of a record at least [numerics]
 SPLIT: Final = 0.65  # share of a lone log that is fitted; the rest is held out [taste]
+RIVALS: Final = 3  # rivals of a verdict that an experiment is looked for, the strongest first [taste]
 
 
 @dataclass(frozen=True)
@@ -332,12 +333,23 @@ def _next_experiment(
     group: Sequence[str],
     design: Callable[[Problem, Fit, Fit], NextExperiment | None],
 ) -> NextExperiment | None:
-    """Split the verdict from its strongest rival."""
-    names = [(name_of(s.fit.candidate), s) for s in outcome.finalists]
-    rivals = [s for name, s in names if name in group and name != opinion.verdict]
-    if not rivals:
-        return None
-    return design(outcome.problem, outcome.best, min(rivals, key=lambda s: s.level).fit)
+    """Split the verdict from its strongest rival; where nothing tells these two apart, from the next one.
+
+    A group of three is worth an experiment that rids it of one. What is refused is refused for the strongest.
+    """
+    rivals: dict[str, Fit] = {}
+    for one in sorted(outcome.finalists, key=lambda s: s.level):
+        name = name_of(one.fit.candidate)
+        if name in group and name != opinion.verdict:
+            rivals.setdefault(name, one.fit)
+    first: NextExperiment | None = None
+    for name, rival in list(rivals.items())[:RIVALS]:
+        found = design(outcome.problem, outcome.best, rival)
+        found = None if found is None else replace(found, splits=(opinion.verdict, name))
+        if found is not None and found.tells:
+            return found
+        first = first or found
+    return first
 
 
 def _notes(search: Search, best: Fit, problem: Problem) -> list[str]:

@@ -33,6 +33,7 @@ class NextExperiment(ABC):
     separation, separation_now : rms difference of the rivals' outputs over the noise, nuisance parameters answered: on
         the profile, and on the log that was given
     chosen_from : profiles that were tried
+    splits : ids of the two that it drives apart, the verdict first
     kind : of profiles, for people
     """
 
@@ -41,6 +42,7 @@ class NextExperiment(ABC):
     separation: float
     separation_now: float
     chosen_from: int = field(default=1, kw_only=True)
+    splits: tuple[str, ...] = field(default=(), kw_only=True)
     kind: ClassVar[str]
 
     @property

@@ -68,8 +68,10 @@ class Guide:
 
 
 def displayed(value: float | None, unit: str, name: str = "") -> str:
-    """A value in the unit that people read: ``displayed(0.004, "m")`` is ``4 mm``; None is what it is and its unit:
-    ``the stop lead (mm)``.
+    """A value in the unit that people read: ``displayed(0.004, "m")`` is ``4 mm``, ``displayed(9.7, "s")`` is
+    ``9.7 s``; None is what it is and its unit: ``the stop lead (mm)``.
     """
     factor, words = _DISPLAYED.get(unit, (1.0, unit))
+    if unit == "s" and value is not None and abs(value) >= 1.0:
+        factor, words = 1.0, "s"
     return f"the {name.replace('_', ' ')} ({words})" if value is None else f"{factor * value:.3g} {words}"

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,36 @@ class Setup:
     time_ns: int
     node: str
     parameters: dict[str, Any]
+
+
+class Told(NamedTuple):
+    """Settings for people: from which log time on, ns, of which node, whether it ``began`` with them, which."""
+
+    time_ns: int
+    node: str
+    began: bool
+    parameters: dict[str, Any]
+
+
+def told_settings(setups: Sequence[Setup]) -> list[Told]:
+    """All at the start, later only what changed; what every node began with alike stands once, as of ``every node``.
+
+    A node's copy of the session's metadata (``session``) is left to the metadata.
+    """
+    began: dict[str, dict[str, Any]] = {}
+    for setup in setups:
+        began[setup.node] = setup.parameters | began.get(setup.node, {})
+    first, *others = began.values() or ({},)
+    shared = {k: v for k, v in first.items() if others and all(k in own and own[k] == v for own in others)}
+    told = [Told(setups[0].time_ns, "every node", True, shared)] if shared else []
+    known: dict[str, dict[str, Any]] = {node: dict(shared) for node in began}
+    for setup in setups:
+        own = known[setup.node]
+        new = {k: v for k, v in setup.parameters.items() if k != "session" and (k not in own or own[k] != v)}
+        if new:
+            told.append(Told(setup.time_ns, setup.node, not own.keys() & new.keys(), new))
+        own.update(new)
+    return told
 
 
 @dataclass(frozen=True)

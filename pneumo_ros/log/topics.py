@@ -6,7 +6,7 @@ The nodes create their publishers and subscriptions from it; docs/topics.md and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from pneumo_ros.rig.channels import CHANNELS, DISPLACEMENTS, ESTIMATE_FIELDS, ROADS, TRUTH_FIELDS, VALVES
@@ -36,6 +36,7 @@ class Topic:
     meaning : what it carries, in a sentence
     publisher : node that publishes it ('' where any node may)
     subscribers : nodes that act on it; the recorder takes everything with ``recorded``
+    in_real_time : nodes that act on it in real time only
     flow : quality of service
     frame_id : of the header
     fields : name -> unit of each value carried (``position`` of a JointState)
@@ -48,6 +49,7 @@ class Topic:
     meaning: str
     publisher: str
     subscribers: tuple[str, ...] = ()
+    in_real_time: tuple[str, ...] = field(default=(), kw_only=True)
     flow: Flow = Flow.STREAM
     frame_id: str = ""
     fields: tuple[tuple[str, str], ...] = ()
@@ -77,7 +79,7 @@ ROAD = Topic(
 )  # fmt: skip
 DISPLACEMENT = Topic(
     "/rig/displacement", JOINT, "calibrated LVDTs, upwards from the ground datum, sprung points above each axle",
-    "plant", ("estimator",), frame_id="ground",
+    "plant", ("estimator",), in_real_time=("road_profile",), frame_id="ground",
     fields=tuple((name, "m") for name in DISPLACEMENTS),
 )  # fmt: skip
 FRONT_PRESSURE = Topic(
@@ -214,7 +216,8 @@ def topics_table() -> str:
     ]
     for t in TOPICS:
         values = ", ".join(f"{name} ({unit})" for name, unit in t.fields) or "-"
-        to = ", ".join(t.subscribers + (("session_recorder",) if t.recorded else ())) or "-"
+        real_time = tuple(f"{node} (real time)" for node in t.in_real_time)
+        to = ", ".join((*t.subscribers, *real_time, *(("session_recorder",) if t.recorded else ()))) or "-"
         lines.append(
             f"| `{t.name}` | {t.type} | {values} | {t.publisher or 'any'} | {to} | {t.flow.value} | {t.meaning} |"
         )

@@ -279,6 +279,7 @@ class RigNode(Node):
     def takers(self, topic: Topic) -> set[str]:
         """Other nodes of the session that act on what ``topic`` carries, or record it."""
         takers = {*topic.subscribers, *(("session_recorder",) if topic.recorded else ())}
+        takers |= set() if self.lockstep else set(topic.in_real_time)
         return takers & self.session_nodes - {self.role}
 
     @property

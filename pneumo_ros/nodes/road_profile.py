@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Publish the road under both axles ahead of the clock, so that a period's end is known when it starts."""
+"""Publish the road under both axles: ahead of the clock, so that a simulated period's end is known when it starts, or
+on hardware, where the exciter begins with the first sample of the armed board, under the stamps of the samples."""
 
 from __future__ import annotations
 
@@ -14,6 +15,7 @@ from pneumo_ros.log import topics
 from pneumo_ros.log.cdr import JointEncoder, stamp_of
 from pneumo_ros.nodes.base import RigNode
 from pneumo_ros.nodes.hand_over import HandOver
+from pneumo_ros.nodes.qos import publisher_qos
 from pneumo_ros.nodes.spin import node_main
 from pneumo_ros.parameters import Value
 from pneumo_ros.rig import load_rig
@@ -45,8 +47,14 @@ class RoadProfileNode(RigNode):
         self._block = -1
         self._heights: list[list[float]] = []
         self._rates: list[list[float]] = []
+        self._last = 0
         self._load(0)
-        self.subscribe(topics.CLOCK if self.lockstep else topics.DISPLACEMENT, self._on_time)
+        if "daq" in self.session_nodes:
+            # Reliable: a node that is held up and misses the first samples would begin the road that much too late.
+            qos = publisher_qos(topics.DISPLACEMENT.flow, lockstep=False)
+            self.subscribe(topics.DISPLACEMENT, self._on_sample, qos)
+        else:
+            self.subscribe(topics.CLOCK if self.lockstep else topics.DISPLACEMENT, self._on_time)
 
     def _on_time(self, data: bytes) -> None:
         start = time.monotonic_ns()
@@ -57,17 +65,32 @@ class RoadProfileNode(RigNode):
         index = round((now - self._start) / self.period_ns) + LEAD
         # A clock that jumps ahead leaves a hole in the road; filling it would flood the log.
         for i in range(max(self._sent + 1, index - BLOCK), index + 1):
-            self._send(i)
+            self._send(i, self._start + i * self.period_ns)
         self.send_off()
         self._sent = max(self._sent, index)
         self.timed(start)
 
-    def _send(self, index: int) -> None:
+    def _on_sample(self, data: bytes) -> None:
+        """The height that the exciter has at this sample, under the sample's own stamp.
+
+        The board counts periods on its own clock, and its samples' stamps follow what is known of that clock: a road
+        that went on by this computer's would leave them, by 1 ms in ten seconds at 100 ppm.
+        """
+        start = time.monotonic_ns()
+        now = stamp_of(data)
+        passed = 1 if self._start is None else max(1, round((now - self._last) / self.period_ns))
+        self._start = now if self._start is None else self._start
+        for behind in range(min(passed, BLOCK) - 1, -1, -1):  # samples that were withheld or lost
+            self._send(self._sent + passed - behind, now - behind * self.period_ns)
+        self.send_off()
+        self._sent, self._last = self._sent + passed, now
+        self.timed(start)
+
+    def _send(self, index: int, stamp: int) -> None:
         block, row = divmod(index, BLOCK)
         if block != self._block:
             self._load(block)
-        assert self._start is not None
-        self._publish(self._encode(self._start + index * self.period_ns, self._heights[row], self._rates[row]))
+        self._publish(self._encode(stamp, self._heights[row], self._rates[row]))
 
     def _load(self, block: int) -> None:
         heights, rates = self.road.sample((block * BLOCK + np.arange(BLOCK)) * self.period_ns * 1e-9)

@@ -91,7 +91,8 @@ class OwnExperiment(NextExperiment):
         """Without the course, which has a file of its own."""
         text = f"{self.aim}; {FILE} holds it"
         return {"text": text, "file": FILE, "name": self.name, "description": self.description,
-                "separation": self.separation, "separation_now": self.separation_now}  # fmt: skip
+                "separation": self.separation, "separation_now": self.separation_now,
+                "splits": list(self.splits)}  # fmt: skip
 
 
 def design_own(problem: Problem, best: Fit, rival: Fit) -> OwnExperiment | None:

@@ -45,6 +45,8 @@ def test_what_comes_next_runs_on_the_bench_that_the_log_is_of(tmp_path: Path) ->
     plant = "node: plant\nparameters: {simulated_rig: 'my rig.yaml', seed: 1}\n"
     hidden = write(tmp_path / "hidden.mcap", [*contract_log(20), ("/rig/setup", STRING, T0, text(plant))])
     assert _bench(hidden) == ("--set", "plant.simulated_rig=my rig.yaml")  # not the rig that the nodes were told
+    (tmp_path / "my rig.yaml").touch()  # typed beside the log, diagnosed from elsewhere
+    assert _bench(hidden) == ("--set", f"plant.simulated_rig={tmp_path / 'my rig.yaml'}")
     nominal = ("/rig/setup", STRING, T0, text(plant.replace("'my rig.yaml'", "''")))
     plain = write(tmp_path / "plain.mcap", [*contract_log(20), nominal])
     assert _bench(plain) == ("--source", "sim")

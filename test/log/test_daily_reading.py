@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from helpers.rig_logs import noisy, simulated, write_log
-from helpers.small_logs import STORE, contract_log, header, write
+from helpers.small_logs import STORE, STRING, T0, contract_log, header, text, write
 from scipy.io import loadmat
 from typer.testing import CliRunner
 
@@ -50,6 +50,25 @@ def test_info_fits_the_terminal_and_tells_events_first(tmp_path: Path, width: in
     assert "…" not in text and max(map(len, text.splitlines())) <= width
     assert text.index("events") < text.index("Topics") < text.index("What explains the run")
     assert "/rig/displacement" in text and "500" in text
+
+
+def test_what_every_node_began_with_is_said_once(tmp_path: Path) -> None:
+    """Five nodes of a session, one of them with the session's metadata among its parameters; a change is the node's."""
+    shared = "mode: lockstep, rate_hz: 500.0, session_id: 764b16"
+    own = {"plant": "seed: 2", "controller": "pole: 10.0", "session_recorder": 'session: \'{"seed": "2"}\''}
+    setups = [f"node: {node}\nparameters: {{{shared}, {one}}}\n" for node, one in own.items()]
+    setups.append(f"node: controller\nparameters: {{{shared}, pole: 12.0}}\n")
+    setups.append("node: controller\nparameters: {rate_hz: 250.0}\n")
+    told = [("/rig/setup", STRING, T0 + i * 10**9, text(setup)) for i, setup in enumerate(setups)]
+    lines = said("info", write(tmp_path / "run.mcap", [*contract_log(300), *told]), width=120).splitlines()
+    words = [line for line in lines if "at the start" in line or "changed at" in line]
+    assert [line.split(":")[0] for line in words] == [
+        "every node at the start", "plant at the start", "controller at the start", "controller changed at 3.000 s",
+        "controller changed at 4.000 s",
+    ]  # fmt: skip
+    assert "mode lockstep, rate_hz 500.0, session_id 764b16" in words[0]
+    assert [line.split(": ")[1] for line in words[1:]] == ["seed 2", "pole 10.0", "pole 12.0", "rate_hz 250.0"]
+    assert str(lines).count("764b16") == 1
 
 
 def test_info_of_a_slow_line_fits_the_terminal_too(tmp_path: Path) -> None:

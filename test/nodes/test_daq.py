@@ -93,6 +93,9 @@ def test_a_session_on_hardware_is_logged_like_a_simulated_one(tmp_path: Path) ->
     assert log.topics["/valve/applied"].count > 2 * RATE
     assert len(displacement.stamp_ns) >= 4 * RATE - 20 and len(raw.stamp_ns) >= 3900
     assert (np.diff(displacement.stamp_ns) > 0).all() and (np.diff(raw.stamp_ns) > 0).all()
+    # The road is under the samples' own stamps, from the first one on, however fast the board's clock is.
+    road = log.joint("/road/profile")
+    assert road.stamp_ns[0] == displacement.stamp_ns[0] and set(displacement.stamp_ns) <= set(road.stamp_ns)
     # Raw counts beside calibrated values: one follows from the other.
     lines = parse_calibration(log.texts("/rig/calibration")[0], "log")
     rows = np.searchsorted(raw.stamp_ns, displacement.stamp_ns)

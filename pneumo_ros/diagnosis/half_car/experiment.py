@@ -65,6 +65,7 @@ class Experiment(NextExperiment):
             "description": self.description,
             "separation": self.separation,
             "separation_now": self.separation_now,
+            "splits": list(self.splits),
         }
 
 
@@ -136,6 +137,18 @@ def _steps(size: float, hold: float) -> Callable[[Array], Array]:
     return valves
 
 
+def _switched(hold: float, seed: int = 1) -> Callable[[Array], Array]:
+    """Inlets shut and at twice their openings at random, each for ``hold`` s or more, as often shut as open."""
+
+    def valves(t: Array) -> Array:
+        rows = (t / hold + 1e-9).astype(int)
+        first = np.random.default_rng(seed).random((rows.max() // 2 + 1, 2)) < 0.5
+        inlets = 2.0 * np.stack([first, ~first], axis=1).reshape(-1, 2)[rows]
+        return np.hstack([inlets, np.ones_like(inlets)])
+
+    return valves
+
+
 # experiments that are compared; each is feasible on the rig [taste]
 PROFILES: Final = (
     Profile(
@@ -165,9 +178,15 @@ PROFILES: Final = (
     ),
     Profile(
         "valve-steps-fast",
-        "inlet steps of 25 % every 0.12 s on a flat road: lag against delay",
+        "inlet steps of 25 % every 0.12 s on a flat road: what is slow beside what is late",
         _flat,
         _steps(0.25, 0.12),
+    ),
+    Profile(
+        "valve-switching",
+        "inlets shut and at twice their openings, at random every 20 ms or more, on a flat road: lag against delay",
+        _flat,
+        _switched(0.02),
     ),
     Profile(
         "valve-steps-small",

@@ -123,6 +123,7 @@ def contents(found: Findings) -> dict[str, Any]:
         "ambiguity": _ambiguity(summary, found.phrases) if told_of else [],
         "rivals_are": _RIVALS.get(str(summary["verdict"]), "These fit it almost as well as the verdict:"),
         "experiment": summary.get("next_experiment"),
+        "splits": " and ".join(effect_name(one) for one in (summary.get("next_experiment") or {}).get("splits") or ()),
         "edit": _edit(summary),
         "refused": _refused(summary),
         "notes": [sentence(note) for note in summary.get("notes", [])],

@@ -13,6 +13,7 @@ from markupsafe import Markup, escape
 
 from pneumo_ros.diagnosis.report.contents import Findings, contents
 from pneumo_ros.diagnosis.report.rig_map import colour
+from pneumo_ros.diagnosis.report.words import sentence
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
 from pneumo_ros.printable import shown
@@ -27,6 +28,7 @@ def render(found: Findings) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=shown
     )
     environment.filters["whole_options"] = whole_options
+    environment.filters["sentence"] = sentence
     return environment.from_string(source).render(contents(found), cold=colour(0.0), hot=colour(1.0))
 
 

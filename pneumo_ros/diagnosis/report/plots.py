@@ -164,23 +164,17 @@ def shrink_bar(value: float, interval: tuple[float, float], width: int = 170, he
     )
 
 
-def ladder(steps: Sequence[tuple[str, float, str]], width: int = 860, row: int = 26) -> str:
-    """The gap's way down on a logarithmic scale: (label, gap, CSS class) per row."""
+def ladder(steps: Sequence[tuple[str, float, str]]) -> str:
+    """The gap's way down on a logarithmic scale: (label, gap, CSS class) per row; a bar's row fits any screen."""
     values = [gap for _, gap, _ in steps if gap > 0.0]
     low = 10.0 ** np.floor(np.log10(min(values) * 0.9)) if values else 1e-3
-    high = max(values) * 1.15 if values else 1.0
-    left = 230.0
-
-    def x(gap: float) -> float:
-        return left + float(np.log(max(gap, low) / low) / np.log(high / low)) * (width - left - 90.0)
-
+    high = max(values) if values else 1.0
     rows = []
-    for k, (label, gap, style) in enumerate(steps):
-        y = 6 + k * row
+    for label, gap, style in steps:
+        width = 100.0 * float(np.log(max(gap, low) / low) / np.log(high / low))
         rows.append(
-            f'<text class="rung" x="{left - 10}" y="{y + 13}" text-anchor="end">{escape(label)}</text>'
-            f'<rect class="rung {style}" x="{left}" y="{y}" width="{x(gap) - left + 1:.1f}" height="{row - 8}" rx="2"/>'
-            f'<text class="rung value" x="{x(gap) + 8:.1f}" y="{y + 13}">{gap:.3g}</text>'
+            f'<div class="rung"><span class="label">{escape(label)}</span>'
+            f'<span class="track"><i class="{style}" style="width:{width:.1f}%"></i></span>'
+            f'<b class="value">{gap:.3g}</b></div>'
         )
-    height = 6 + row * len(steps)
-    return f'<svg class="ladder" viewBox="0 0 {width} {height}" role="img" aria-label="gap">{"".join(rows)}</svg>'
+    return "".join(rows)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pneumo_ros.diagnosis.half_car.experiment import ROAD_FILE, VALVE_FILE
-from pneumo_ros.diagnosis.report.words import LIKELY, first_place, forbidden, place_words
+from pneumo_ros.diagnosis.report.words import LIKELY, effect_name, first_place, forbidden, place_words
 
 # For a place without a name: (what moves it, the road that does) [display]
 _TELLING: Final = {
@@ -22,6 +22,8 @@ _TELLING: Final = {
     "body": ("that shakes heave and pitch", "--road bump"),
     "road": ("on another road than the one that was fitted", "--road E"),
 }
+
+_ORDINALS: Final = ("second", "third", "fourth", "fifth")  # names of logs that come next [display]
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,7 @@ def _own_steps(summary: Mapping[str, Any], asked: Asked) -> list[Step]:
 
 def _own_experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
     file = shlex.quote(str(asked.output / str(experiment["file"])))
-    aim = f"Split the rivals: {str(experiment['description']).rstrip('.')}. {file} holds it"
+    aim = f"{_split(experiment)}: {str(experiment['description']).rstrip('.')}. {file} holds it"
     return Step(f"{aim}; it stays inside what the log had of range and rate. Log that, and fit both logs.")
 
 
@@ -118,8 +120,16 @@ def _experiment(experiment: Mapping[str, Any], asked: Asked) -> Step:
     run = asked.session(*(word for pair in files.items() for word in pair), "--duration", length, output=played)
     text = str(experiment["description"]).rstrip(".")
     return Step(
-        f"Split the rivals: {text}.{_where(asked)}", (run, asked.diagnosis(played, output=_another(asked.output)))
+        f"{_split(experiment)}: {text}.{_where(asked)}", (run, asked.diagnosis(played, output=_another(asked.output)))
     )
+
+
+def _split(experiment: Mapping[str, Any]) -> str:
+    """What an experiment is for: "Split heat transfer from leak"."""
+    names = [" and ".join(effect_name(one) for one in str(name).split("+")) for name in experiment.get("splits") or ()]
+    if len(names) != 2:
+        return "Split the rivals"
+    return f"Tell whether {names[1]} is there at all" if names[0] == "none" else f"Split {names[0]} from {names[1]}"
 
 
 def _where(asked: Asked) -> str:
@@ -130,11 +140,21 @@ def _where(asked: Asked) -> str:
 
 
 def _second(asked: Asked) -> Path:
-    return asked.fit[0].parent / "second.mcap"
+    """A log beside the first one that is neither given nor there: second.mcap, then third.mcap and so on."""
+    folder = asked.fit[0].parent
+    known = {log.name for log in (*asked.fit, *([asked.holdout] if asked.holdout else []))}
+    names = (*_ORDINALS, *(f"session-{number}" for number in range(len(_ORDINALS) + 2, 1000)))
+    fresh = (folder / f"{name}.mcap" for name in names if f"{name}.mcap" not in known)
+    return next(path for path in fresh if not path.exists())
 
 
 def _another(folder: Path) -> Path:
-    return folder.with_name(f"{folder.name}-2")
+    """The next folder of a row that is not there: report, report-2, report-3."""
+    stem, _, last = folder.name.rpartition("-")
+    follows = stem and last.isdigit() and folder.with_name(stem).exists()
+    name, number = (stem, int(last)) if follows else (folder.name, 1)
+    rest = (folder.with_name(f"{name}-{k}") for k in range(number + 1, number + 1000))
+    return next(path for path in rest if not path.exists())
 
 
 def _more(asked: Asked, text: str, options: str) -> Step:

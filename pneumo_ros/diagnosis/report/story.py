@@ -37,6 +37,7 @@ from pneumo_ros.diagnosis.report.words import (
     forbidden,
     headline,
     how_far,
+    poor_timing,
 )
 
 
@@ -105,7 +106,7 @@ def story(summary: Mapping[str, Any], known: Known) -> Story:
     verdict = str(summary["verdict"])
     phrases = {name: effect.summary for name, effect in known.library.items()}
     tell = _named if verdict not in UNNAMED else {"unknown": _unknown}.get(verdict, _nothing)
-    facts = [*tell(summary, known), *_own(summary, known)]
+    facts = [*tell(summary, known), ("timing", poor_timing(summary)), *_own(summary, known)]
     steps = tuple(next_steps(summary, known.asked))
     return Story(headline(summary, phrases), confidence(summary), tuple(fact for fact in facts if fact[1]), steps)
 

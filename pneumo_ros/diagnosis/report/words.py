@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from pneumo_ros.diagnosis.result import DIFFERS
-from pneumo_ros.diagnosis.signals.types import NO_VERDICT
+from pneumo_ros.diagnosis.signals.types import BUSY, NO_VERDICT
 
 SURE: Final = 0.9  # probability from which the page says "sure" [display]
 LIKELY: Final = 0.6  # probability from which the page says "likely" [display]
@@ -70,6 +70,12 @@ def forbidden(summary: Mapping[str, Any]) -> str:
     notes = (str(note) for note in summary.get("notes", ()))
     told = next((note for note in notes if note.endswith(NO_VERDICT)), "")
     return told.removesuffix(NO_VERDICT)
+
+
+def poor_timing(summary: Mapping[str, Any]) -> str:
+    """What the logs' time base leaves of the verdict; '' where it is good."""
+    told = [str(note) for note in summary.get("notes", ()) if BUSY in str(note)]
+    return " ".join(dict.fromkeys(told))
 
 
 def first_place(summary: Mapping[str, Any]) -> str:

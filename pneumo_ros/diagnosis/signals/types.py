@@ -10,6 +10,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+# In the sentence of a limitation of the time base, which the first screen tells beside the verdict [display]
+BUSY: Final = "the computer was busy"
 NO_VERDICT: Final = "; no verdict."  # ends the sentence of a limitation that forbids one [display]
 
 

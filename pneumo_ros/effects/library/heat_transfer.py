@@ -65,10 +65,10 @@ EFFECT = Effect(
         check=(
             "bring the body to design height and the spring to 3 bar absolute, close the valves, press the body "
             "down by 10 mm quickly, hold it there and log the pressure: it jumps, then falls back while the air "
-            "cools, by 29 % of the jump in the end and by two thirds of that within {settling}, although nothing "
+            "cools, by 29 % of the jump in the end and by two thirds of that within {settling_time}, although nothing "
             "leaks"
         ),
-        expects={"settling": SETTLING},
+        expects={"settling_time": SETTLING},
         mistaken_for={
             "leak": "the pressure does not come back when the body is let go",
             "bellows_hysteresis": "shows in the force, not in the pressure",

@@ -12,7 +12,7 @@ from typing import Any
 
 from pneumo_ros.log.conformance import Finding, check_conformance
 from pneumo_ros.log.decoded import Log
-from pneumo_ros.log.inspection import Event, Report, Setup, TopicReport, inspect_log
+from pneumo_ros.log.inspection import Event, Report, Setup, TopicReport, inspect_log, told_settings
 from pneumo_ros.session.passive import passive_session
 from pneumo_ros.session.picture import draw_session
 from pneumo_ros.session.summary import (
@@ -133,14 +133,9 @@ def topic_row(topic: TopicReport) -> Row:
 
 def setup_rows(setups: Sequence[Setup], start_ns: int) -> Iterator[Row]:
     """(time s since the first sample, node, what, parameters): all at the start, later only what changed."""
-    before: dict[str, dict[str, object]] = {}
-    for setup in setups:
-        known = before.setdefault(setup.node, {})
-        new = {key: value for key, value in setup.parameters.items() if key not in known or known[key] != value}
-        word = "changed" if known.keys() & new.keys() else "start"
-        known.update(new)
+    for time_ns, node, began, new in told_settings(setups):
         shown = ", ".join(f"{key} {_short(str(value))}" for key, value in new.items() if value != "")
-        yield (_seconds(setup.time_ns - start_ns), setup.node, word, shown)
+        yield (_seconds(time_ns - start_ns), node, "start" if began else "changed", shown)
 
 
 def _facts(report: Report) -> list[tuple[str, str]]:

@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from helpers.own_logs import QUICK, drawn, log
 
-from pneumo_ros.diagnosis.diagnose import Options, diagnose
+from pneumo_ros.diagnosis.diagnose import Options, _next_experiment, diagnose
 from pneumo_ros.diagnosis.experiment import SEPARATES
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.experiment import DURATION, PERIOD, PROFILES, Experiment, design_experiment
 from pneumo_ros.diagnosis.half_car.signals import Signals
+from pneumo_ros.diagnosis.report.steps import next_steps
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.growth import grow
 from pneumo_ros.diagnosis.search.state import Search
@@ -83,3 +86,32 @@ def test_what_would_tell_nothing_is_not_offered(
     notes = [note for note in found.notes if "no experiment is offered" in note]
     assert (found.experiment is not None) == (separation >= SEPARATES) == (not notes)
     assert all("of 10 road and valve profiles" in note and "by hand" in note for note in notes)
+
+
+@pytest.mark.parametrize("second_tells", [True, False])
+def test_where_the_strongest_rival_cannot_be_split_off_the_next_one_is(second_tells: bool) -> None:
+    """Of three that a log does not tell apart one may be told; what is refused is refused for the strongest."""
+    nothing, time, asked = np.zeros((2, 4)), np.array([0.0, 0.1]), []
+
+    def finalist(effect: str, level: float) -> Any:
+        return SimpleNamespace(level=level, fit=SimpleNamespace(candidate=Candidate(((effect, "front"),))))
+
+    def design(problem: Any, best: Any, rival: Any) -> Experiment:
+        asked.append(rival.candidate.parts[0][0])
+        separation = 7.0 if second_tells and len(asked) == 2 else 0.1 * len(asked)
+        return Experiment(f"number {len(asked)}", "sweep", separation, 0.0, time, nothing[:, :2], nothing)
+
+    finalists = [finalist("valve_lag", 3.0), finalist("leak", 1.0), finalist("orifice_coefficient", 2.0)]
+    outcome: Any = SimpleNamespace(
+        finalists=[*finalists, finalist("orifice_coefficient", 2.5)], problem=None, best=None
+    )
+    found = _next_experiment(outcome, cast("Any", SimpleNamespace(verdict="leak")), KEPT, design)
+    assert asked == ["orifice_coefficient", "valve_lag"] and found is not None
+    if not second_tells:
+        assert (
+            found.splits == ("leak", "orifice_coefficient") and "would drive the rivals 0.1 standard" in found.refusal
+        )
+        return
+    assert found.splits == ("leak", "valve_lag")
+    step = next_steps({"verdict": "leak", "probability": 0.5, "next_experiment": found.to_json()})[0]
+    assert step.text.startswith("Split leak from valve lag: sweep."), step.text

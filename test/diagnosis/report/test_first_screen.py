@@ -68,6 +68,15 @@ def test_a_law_of_another_kind_is_as_big_as_its_measured_curve() -> None:
     assert facts["how big"] == "leak as measured, flow over pressure: 4 g/s at 200 kPa, 10 g/s at 300 kPa"
 
 
+def test_a_busy_computer_stands_beside_the_verdict() -> None:
+    """What may come from the time base is read before anybody takes a valve out; other notes stay in the report."""
+    found, known = findings(), Known(LIBRARY)
+    late = "fit.mcap: The openings were 5 ms late: the computer was busy."
+    summary = {**found.summary, "notes": ["another note", late, late]}
+    assert dict(story(summary, known).facts)["timing"] == late
+    assert "timing" not in dict(story(found.summary, known).facts)
+
+
 def test_the_first_screen_says_what_where_how_big_what_it_mends_and_how_to_check_it() -> None:
     found = findings()
     said = story(found.summary, Known(LIBRARY, gains(found.holdout, found.trajectories)))
@@ -243,6 +252,15 @@ def test_every_row_of_a_table_stands_under_its_heads(tmp_path: Path, width: int)
             "const shown = row => [...row.cells].filter(cell => cell.offsetWidth);"
             "return [...document.querySelectorAll('tr')].map(row => shown(row).map(cell => cell.offsetTop))"
         )
+        bars = tab.driver.execute_script(
+            "return [...document.querySelectorAll('.rung > *')].map(one => [one.className, one.offsetWidth, "
+            "one.getBoundingClientRect().right, one.textContent])"
+        )
+    gap = findings().summary["gap"]
+    assert [text for name, _, _, text in bars if name == "value"][:2] == [
+        f"{gap[key]:.3g}" for key in ("nominal", "refit")
+    ]
+    assert all(wide > 0 and right <= width for _, wide, right, _ in bars), "a bar and its number are on the screen"
     assert len(rows) > 5
     for tops in rows:
         assert len(set(tops)) <= 1, "the cells of a row stand side by side"

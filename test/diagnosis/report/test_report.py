@@ -76,7 +76,6 @@ def test_the_page_says_verdict_place_size_and_shrink() -> None:
     assert "0.4100 ± 0.0020" in page and "mm²" in page
     assert "orifice coefficient: an orifice" in page
     assert "Open both inlets fully. It would drive the rivals 31 times the noise apart" in page
-    assert "<code>pneumo run --road a.csv --valves b.csv</code>" in page
     assert "droop ended at its bound" in page and "not testable here: the spring never came near it" in page
     assert "heavier.mcap (sprung mass +10.0 %): gap 1.3 nominal, 0.5 re-estimated, 0.02" in page
     assert "held&lt;out&gt;.mcap" in page and "held<out>" not in page
@@ -140,6 +139,8 @@ def test_every_verdict_says_what_to_do_next() -> None:
     assert diagnosed == "pneumo diagnose logs/a.mcap logs/second.mcap --holdout logs/b.mcap --output 'out dir-2'"
     assert "the front air and valve" in second.text and "--save-rig 'out dir/rig.yaml'" in second.commands[0]
     page = render(replace(found, asked=asked))
+    assert "The commands that play it on the rig of these logs stand at the top" in page
+    assert "In the folder of this page" not in page  # that one would have driven the nominal rig
     assert escape(second.text) in re.sub("</?span[^>]*>", "", page) and diagnosed in unescape(page)
     assert '<span class="option">--rig</span>' in page  # not broken over two lines
     assert "Only a session of the rig that made the logs tells" in first.text  # they do not say which one it was
@@ -285,3 +286,17 @@ def test_laws_of_one_family_are_told_apart_in_the_ranking() -> None:
         "lag (the input force)",
         "none",
     ]
+
+
+def test_the_second_experiment_is_another_log_and_another_folder(tmp_path: Path) -> None:
+    """What was played is given already, or is there: its name is not offered again, nor the report's folder."""
+    summary = {"verdict": "leak", "probability": 0.5, "next_experiment": {"description": "a sweep"}}
+    logs, report = (tmp_path / "fit.mcap", tmp_path / "second.mcap"), tmp_path / "report"
+    (tmp_path / "third.mcap").touch()
+    played, diagnosed = next_steps(summary, Asked(logs, None, report))[0].commands
+    assert played.endswith(f"--output {tmp_path / 'fourth.mcap'}")
+    assert f"{logs[0]} {logs[1]} {tmp_path / 'fourth.mcap'} --output {report}-2" in diagnosed
+    for name in ("report", "report-2"):
+        (tmp_path / name).mkdir()
+    _, again = next_steps(summary, Asked(logs, None, tmp_path / "report-2"))[0].commands
+    assert again.endswith(f"--output {report}-3")

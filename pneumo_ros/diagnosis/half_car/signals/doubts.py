@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.signals.types import Limitation, TopicData
+from pneumo_ros.diagnosis.signals.types import BUSY, Limitation, TopicData
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.air_spring import effective_area, load_surface
 from pneumo_ros.rig import Rig
@@ -18,6 +18,13 @@ from pneumo_ros.units import GRAVITY
 ROAD_LIMIT: Final = 0.5  # m; the exciter moves by centimetres [physics]
 # s by which a topic's delay may move against the others: a stalled recorder delays all alike [taste]
 CLOCK_STEP: Final = 0.05
+# Share of a sample's period by which a hardware log's stamps may be off before that is told: half a millisecond at 500
+# Hz moves a wheel on a class D road by 0.05 mm, five times its sensor's noise [physics]
+OFF_PACE: Final = 0.25
+ONE_IN: Final = 0.01  # share of the openings whose delay is told [taste]
+# Periods between openings, in the slowest of which the loop has fallen behind by a whole one [physics]
+UNEVEN: Final = 2.0
+MOVED: Final = 0.2  # openings for each sample from which a log is one of valves at work [taste]
 PIECES: Final = 3  # the delay of the first third is compared with the last third's [numerics]
 # Spring force over static load at the middle of a log that is right: an area or a load off by a tenth at both ends
 # stays outside [physics]
@@ -62,6 +69,49 @@ def check_clocks(topics: Mapping[str, TopicData], log: str) -> list[Limitation]:
                               "the end; its stamps are even, so they are used as they are.")
         for topic, change in late.items()
     ]  # fmt: skip
+
+
+def check_pace(road: TopicData, measured: TopicData, applied: TopicData, log: str) -> list[Limitation]:
+    """What is said of a hardware log whose stamps do not keep the board's pace: it samples evenly, the road begins with
+    its first sample, and the openings come as evenly as the samples that they answer. A computer that was busy stamps
+    late what it hears late, and what it sends reaches the board when the board's line gets to it.
+    """
+    steps = np.diff(measured.stamp)
+    period = float(np.median(steps))
+    found = []
+    late = float(road.stamp[0] - measured.stamp[0])
+    if late > OFF_PACE * period:
+        text = (
+            f"/road/profile begins {1e3 * late:.2g} ms after the rig's first sample, with which it is played: {BUSY}, "
+            "and what is said of road and tyres may come from that. Record it again."
+        )
+        found.append(Limitation("road_late", text, (), 0.5))
+    counted = np.concatenate([[0.0], np.cumsum(np.maximum(1.0, np.round(steps / period)))])
+    even = np.polynomial.Polynomial.fit(counted, measured.stamp, 1)
+    off = float(np.max(np.abs(measured.stamp - even(counted))))
+    if off > OFF_PACE * period:
+        text = (
+            f"The stamps of {log} leave the board's even pace by up to {1e3 * off:.2g} ms: {BUSY} while it learnt the "
+            "board's clock. Effects that are smaller than this delay are not told from it."
+        )
+        found.append(Limitation("off_pace", text, (), 0.8))
+    return [*found, *_check_openings(applied, period, len(measured.stamp))]
+
+
+def _check_openings(applied: TopicData, period: float, samples: int) -> list[Limitation]:
+    openings = np.column_stack(list(applied.channels.values()))
+    moved = np.any(np.diff(openings, axis=0) != 0.0, axis=1)
+    if np.count_nonzero(moved) < MOVED * samples:
+        return []
+    slowest = float(np.quantile(np.diff(applied.stamp)[moved], 1.0 - ONE_IN))
+    if slowest <= UNEVEN * period:
+        return []
+    text = (
+        f"One opening in {1.0 / ONE_IN:.0f} went to the valves {1e3 * slowest:.2g} ms or more after the one before, "
+        f"not {1e3 * period:.2g} ms: {BUSY}, and when the valves acted is not known to a sample. What is said of air "
+        "and valves may come from that; record it again on a quiet computer."
+    )
+    return [Limitation("openings_uneven", text, (), 0.5)]
 
 
 def _came_late(data: TopicData) -> bool:

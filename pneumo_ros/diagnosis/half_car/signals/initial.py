@@ -15,6 +15,8 @@ from pneumo_ros.rig import Rig
 # give rates to 2 mm/s [physics]
 WINDOW: Final = 0.06
 DEGREE: Final = 3  # degree of the polynomial in the window [physics]
+# Standard deviations of the noise that a window's cubic misses, above which it is more than noise [taste]
+NOT_FOLLOWED: Final = 1.5
 UNKNOWN_HEIGHT_STD: Final = 5e-3  # m, a spring's height when one of its two sensors is missing [taste]
 UNKNOWN_RATE_STD: Final = 0.05  # m/s, of a point whose sensor is missing [taste]
 UNKNOWN_PRESSURE_STD: Final = 0.1  # relative, of a pressure whose sensor is missing [taste]
@@ -66,7 +68,10 @@ def _smoothed(values: NDArray[np.float64], weight: NDArray[np.float64], noise: f
     basis = np.vander(real * period / span, DEGREE + 1, increasing=True)
     inverse = np.linalg.pinv(basis)
     coefficient = inverse @ values[real]
-    std = np.sqrt((inverse**2).sum(axis=1)) * noise
+    missed = float(np.sqrt(np.sum((values[real] - basis @ coefficient) ** 2) / (len(real) - DEGREE - 1)))
+    # What the cubic cannot follow is in its coefficients as well: a log that begins on a rough road says less of its
+    # start than its noise would have it.
+    std = np.sqrt((inverse**2).sum(axis=1)) * (missed if missed > NOT_FOLLOWED * noise else noise)
     return _Point(coefficient[0], coefficient[1] / span, std[0], std[1] / span)
 
 

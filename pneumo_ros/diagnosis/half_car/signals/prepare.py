@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.diagnosis.half_car.signals.doubts import check_clocks, check_gauge, check_road_unit
+from pneumo_ros.diagnosis.half_car.signals.doubts import check_clocks, check_gauge, check_pace, check_road_unit
 from pneumo_ros.diagnosis.half_car.signals.health import all_limits, check_channel, missing
 from pneumo_ros.diagnosis.half_car.signals.initial import estimate_initial
 from pneumo_ros.diagnosis.half_car.signals.interruptions import LoggedEvent, as_applied, as_commanded, stretches_unknown
@@ -73,6 +73,8 @@ def prepare(
     limits: list[Limitation] = []
     clean = _one_clock(topics, name, limits)
     grid, period = _grid(clean, name, limits, events)
+    if APPLIED in clean and DISPLACEMENT in clean:
+        limits += check_pace(clean[ROAD], clean[DISPLACEMENT], clean[APPLIED], name)
     commands, road = _inputs(clean, grid, period, rig, name, limits)
     check_road_unit(road, name)
     measured, weight, noise, stated = _measured(clean, grid, commands, rig, name, limits)

@@ -126,7 +126,7 @@ def _masks(design: Design, e: int) -> Iterator[tuple[str, str, Mask]]:
     yield "velocity", "fast extension", fast & (speed >= 0)
     yield "velocity", "fast motion", fast
     yield "velocity", "slow motion", ~fast
-    yield from _thirds("height", ("low", "middle", "high"), end.travel[at])
+    yield from _thirds("height", ("spring short", "spring at middle height", "spring long"), end.travel[at])
     yield from _thirds("opening", ("inlet nearly closed", "inlet half open", "inlet wide open"), end.inlet[at])
     yield from _flow_masks(end, at)
     yield from _contact_masks(end, at)

@@ -9,7 +9,7 @@ from helpers.rig_logs import RATE, noisy, simulated, topics_of_channels
 
 from pneumo_ros.diagnosis.half_car.signals import Signals, TopicData, prepare
 from pneumo_ros.diagnosis.half_car.signals.interruptions import LoggedEvent
-from pneumo_ros.diagnosis.half_car.signals.prepare import APPLIED, VALVE
+from pneumo_ros.diagnosis.half_car.signals.prepare import APPLIED, DISPLACEMENT, ROAD, VALVE
 from pneumo_ros.errors import InputError
 from pneumo_ros.plant.trim import nominal_half_car
 from pneumo_ros.rig import load_rig
@@ -71,6 +71,35 @@ def test_without_them_the_stretch_is_left_out_and_said(tripped: Topics) -> None:
     assert signals.start == pytest.approx(ARMED_AGAIN + 0.5, abs=2.0 / RATE)
     assert "1.4 s are left out" in said(signals, "valves_safe") and signals.confidence_cap < 1.0
     assert "1 complaints" in said(signals, "commands_refused")
+
+
+def test_a_busy_computer_is_told_where_the_stamps_leave_the_boards_pace(tripped: Topics) -> None:
+    """A road that begins late, and a clock that was learnt late; a crystal that is merely fast is neither."""
+    assert not {"road_late", "off_pace"} & set(codes(prepare(tripped, load_rig())))
+    fast = {topic: data._replace(stamp=data.stamp * (1.0 + 2e-4)) for topic, data in tripped.items()}
+    assert not {"road_late", "off_pace"} & set(codes(prepare(fast, load_rig())))
+    road = tripped[ROAD]
+    late = prepare({**tripped, ROAD: road._replace(stamp=road.stamp + 0.012)}, load_rig())
+    assert "begins 12 ms after" in said(late, "road_late") and late.confidence_cap <= 0.5
+    heights = tripped[DISPLACEMENT]
+    learnt = heights._replace(stamp=heights.stamp + np.where(heights.stamp < 2.0, 0.0015, 0.0))
+    off = prepare({**tripped, DISPLACEMENT: learnt}, load_rig())
+    assert "even pace by up to 0.8 ms" in said(off, "off_pace") and off.confidence_cap <= 0.8
+    # Another recorder's road need not begin with the rig.
+    foreign = {topic: data for topic, data in tripped.items() if topic != APPLIED}
+    assert "road_late" not in codes(prepare({**foreign, ROAD: road._replace(stamp=road.stamp + 0.012)}, load_rig()))
+
+
+def test_openings_that_went_out_late_are_told(tripped: Topics) -> None:
+    """One in fifty is sent five milliseconds late, as by a computer with other work; in shut valves it is nothing."""
+    sent = tripped[APPLIED]
+    late = np.where(np.arange(len(sent.stamp)) % 50 == 0, 0.005, 0.0)
+    busy = prepare({**tripped, APPLIED: sent._replace(stamp=np.maximum.accumulate(sent.stamp + late))}, load_rig())
+    assert "One opening in 100" in said(busy, "openings_uneven") and "not 2 ms" in said(busy, "openings_uneven")
+    assert busy.confidence_cap <= 0.5
+    even = {**sent.channels, "front_inlet": np.zeros(len(late))}
+    shut = sent._replace(stamp=sent.stamp + late, channels={name: 0.0 * values for name, values in even.items()})
+    assert "openings_uneven" not in codes(prepare({**tripped, APPLIED: shut}, load_rig()))
 
 
 def test_events_of_other_nodes_cut_nothing(tripped: Topics) -> None:
