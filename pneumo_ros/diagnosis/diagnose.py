@@ -166,7 +166,7 @@ def _outcome(search: Search, holdout: Record, options: Options, tell: Progress) 
     tell(0.94, "what else could be closed")
     rest = after if after is not None else before
     likely = [] if rest is None else [place for place, share in rest.shares if share > LIKELY]
-    beside = closable(problem, best, holdout, floor, runs["refit"].total, likely, equations)
+    beside = closable(problem, base, best, holdout, floor, runs["refit"].total, likely, equations)
     return replace(found, closable=beside, before=before, after=after)
 
 

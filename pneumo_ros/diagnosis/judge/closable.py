@@ -18,7 +18,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in, mean_in
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in, mean_in, mended_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
@@ -63,6 +63,8 @@ class EffectEvidence:
         follows, over the least that this kind of error leaves; infinite where nothing is asked
     missing : what the structure leaves in the equations that the effect acts in, along the held-out log, and what is
         left there without it, mean squares in null variances; None where nobody looked, or the tolerances answer for it
+    mended : share of what the refit leaves in the equations that it acts in that the structure leaves as well, mean
+        square above noise; infinite where nobody looked, or where they hardly show a gap
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -80,6 +82,7 @@ class EffectEvidence:
     instead: float = 1.0
     follows: float = np.inf
     missing: tuple[float, float] | None = None
+    mended: float = np.inf
 
     @property
     def family(self) -> str:
@@ -149,6 +152,7 @@ class Closable:
 
 def closable(
     problem: Problem,
+    base: Fit,
     best: Fit,
     holdout: Record,
     floor: float,
@@ -160,7 +164,7 @@ def closable(
 
     Parameters
     ----------
-    problem, best : the structure, fitted to all blocks
+    problem, base, best : the refit and the structure, fitted to all blocks
     holdout : the held-out record
     floor : gap that sensors and the model's stated form leave, as the contract's gap
     refit : held-out gap of the refit, as the contract's
@@ -181,6 +185,7 @@ def closable(
     instead = problem.each(lambda it: _instead(problem, best, holdout, floor, *it), elsewhere)
 
     still = None if equations is None else left_in(equations, problem, best)
+    before = None if equations is None else left_in(equations, problem, base)
 
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
@@ -189,14 +194,16 @@ def closable(
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         # The equations estimate the tolerances anew: where these answer for the effect, they do so there as well.
         answered = problem.strains(bare.x) and not problem.strains(best.x)
-        missing = None
-        if equations is not None and still is not None and not answered:
+        missing, mended = None, np.inf
+        if equations is not None and still is not None and before is not None:
             acting = equations.of(at[law])
-            missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
+            mended = mended_in(still, before, acting)
+            if not answered:
+                missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent,
-            follows=_followed(problem, holdout, missed.predicted, law, at[law]), missing=missing,
+            follows=_followed(problem, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
 

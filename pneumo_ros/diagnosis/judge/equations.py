@@ -56,3 +56,9 @@ def mean_in(left: Array, acting: Mask) -> float:
     What is missing in the others says nothing of it: one sensor that is late may fill all of them.
     """
     return float(np.mean(left[acting])) if np.any(acting) else float(np.mean(left))
+
+
+def mended_in(left: Array, before: Array, acting: Mask) -> float:
+    """:func:`kept` in the equations that something acts in; infinite where these hardly show a gap before."""
+    own, other = mean_in(left, acting), mean_in(before, acting)
+    return kept(own, other) if other - EXPLAINED >= SHOWN else np.inf

@@ -47,7 +47,7 @@ class Calibration:
         that to say nothing: what explains less is no rival
     kept : share of what the refit leaves in the rig's own equations along the held-out log, mean square above noise,
         that the structure must leave to be as likely something else: it moves the run by forces and flows that the rig
-        does not have
+        does not have; of an effect whose own equations show a gap no more than there, for others may miss the most
     unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
         likely something else
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
@@ -206,7 +206,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
                min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
-               c.traces / max(beyond(held.refit, 1.0), 1e-9), held.kept / c.kept,
+               c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,
                max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0])]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it.
     if one.places[0].startswith(SENSOR):

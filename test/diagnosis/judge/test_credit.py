@@ -40,6 +40,7 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
             FAR,
         ),
         "the equations miss what they did": (SURE, replace(FAR, kept=k * c.kept)),
+        "its own miss what they did": (replace(SURE, mended=k * c.kept), replace(FAR, kept=10.0)),
         "they miss nothing without it": (
             replace(SURE, missing=(1.0 + 1e6 * (c.unheld[0] + k * (c.unheld[1] - c.unheld[0])), 1.0 + 1e6)),
             FAR,
@@ -62,6 +63,12 @@ def test_what_the_equations_miss_is_named_beside_what_nobody_can_predict(without
     """It closes 6 % of the run's gap; the equations miss 4 null variances with it and so many without."""
     one = replace(SURE, missing=(4.0, without))
     assert (credit(one, HeldOutGaps(100.0, 94.0), CONSTANTS) > 0.5) is named
+
+
+def test_what_others_miss_is_no_reason_against_what_has_mended_its_own_equations() -> None:
+    others = replace(FAR, kept=0.98)
+    assert credit(SURE, others, CONSTANTS) < 0.4
+    assert credit(replace(SURE, mended=0.05), others, CONSTANTS) > 0.99
 
 
 def test_a_certain_credit_is_told_as_often_as_such_were_right_and_a_half_stays_a_half() -> None:

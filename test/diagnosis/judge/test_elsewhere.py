@@ -40,7 +40,7 @@ def called(
     candidate = Candidate(names)
     x = problem.start(candidate, np.zeros(problem.fixed), list(start))
     best = fit(problem, candidate, x, rows=np.ones(len(problem.measured), dtype=bool), iterations=20)
-    return closable(problem, best, records[1], total_floor(records[1]), refit, [])
+    return closable(problem, best, best, records[1], total_floor(records[1]), refit, [])
 
 
 def likely(found: Closable, one: EffectEvidence | None = None) -> float:
@@ -111,7 +111,7 @@ def test_what_two_names_share_between_them_is_exchanged_whole(model: RigModel) -
     found = called(model, truth, names, tuple(p.typical for name, _ in names for p in model.effects[name].parameters))
     rest = found.remainders[0]
     assert rest.places == ("body_pitch",) and not rest.fit.candidate.laws
-    assert [likely(found, one) < 0.05 for one in found.effects] == [True, True]
+    assert [likely(found, one) < 0.1 for one in found.effects] == [True, True]
 
 
 def test_effects_are_exchanged_alone_and_all_that_one_place_may_stand_for() -> None:

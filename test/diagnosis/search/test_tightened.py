@@ -106,6 +106,6 @@ def test_equations_are_not_asked_for_what_the_tolerances_answer(name: str, asked
     search = searched(name, 0.8)
     problem = search.problem
     best = next(one for one in search.finalists if one.candidate.laws == ((name, ""),))
-    told = closable(problem, best, problem.records[0], 0.02, 0.5, (), Unmoved())
+    told = closable(problem, search.refit, best, problem.records[0], 0.02, 0.5, (), Unmoved())
     (evidence,) = told.effects
     assert evidence.missing == ((5.0, 5.0) if asked else None)

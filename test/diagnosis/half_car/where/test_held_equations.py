@@ -12,7 +12,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.diagnosis.half_car.where import held_equations, locate
 from pneumo_ros.diagnosis.half_car.where.weak import EQUATIONS
-from pneumo_ros.diagnosis.judge.equations import SHOWN, kept
+from pneumo_ros.diagnosis.judge.equations import SHOWN, kept, mended_in
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.rig import load_rig
@@ -102,6 +102,13 @@ def test_equations_by_place(model: RigModel, places: tuple[str, ...], acting: st
     fit_log, held = rig_with(model)
     mask = held_equations(model, (fit_log,), held).of(places)
     assert " ".join(name for name, on in zip(EQUATIONS, mask, strict=True) if on) == acting
+
+
+def test_what_is_mended_is_asked_where_something_acts_and_a_gap_shows() -> None:
+    left, before = np.array([1.0, 3.0, 90.0]), np.array([1.2, 41.0, 91.0])
+    assert mended_in(left, before, np.array([False, True, False])) == pytest.approx(2.0 / 40.0)
+    assert mended_in(left, before, np.array([True, False, False])) == np.inf  # hardly any gap there
+    assert mended_in(left, before, np.zeros(3, dtype=bool)) > 0.6  # acts in none of them: all are asked
 
 
 def test_a_gap_that_the_equations_hardly_show_is_no_reference() -> None:
