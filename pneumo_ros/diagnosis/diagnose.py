@@ -45,7 +45,7 @@ from pneumo_ros.errors import InputError
 Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a structure
 # (model, fit logs, held-out log, a structure or None, threads) -> of what the nominal model leaves, and of what it does
 Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]
-# (model, fit logs, held-out log) -> what a structure leaves in the equations along the held-out one
+# (model, fit logs, held-out log) -> the rig's equations along the held-out one
 HoldEquations = Callable[[Any, Sequence[Any], Any], Equations]
 LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
 SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]

@@ -161,7 +161,7 @@ def diagnose_files(
 
 
 def left_in_equations(model: RigModel, fit: Sequence[Signals], holdout: Signals) -> Equations:
-    """What structures leave in the held-out log's equations: :data:`pneumo_ros.diagnosis.diagnose.HoldEquations`."""
+    """The equations along the held-out log: :data:`pneumo_ros.diagnosis.diagnose.HoldEquations`."""
     return held_equations(model, fit, holdout)
 
 

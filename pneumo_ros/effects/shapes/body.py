@@ -4,7 +4,7 @@
 A load lies somewhere: it brings m r^2 of pitch inertia with it and moves the centre of mass towards itself. A part that
 was moved along the body changes both as well. What lies above the axis of pitch tips further the way the body pitches,
 by m g h a radian, and so does a liquid's free surface, by rho g I of its waterplane a radian (Tupper 2013,
-"Introduction to Naval Architecture", section 4). Written as forces on the body above the axles, downwards where it is
+"Introduction to Naval Architecture"). Written as forces on the body above the axles, downwards where it is
 the lower: k (z_f - z_r) with the heights z from the first instant on, which is k L^2 a radian for a wheelbase L.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
@@ -19,6 +19,7 @@ from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
 from pneumo_ros.effects.hooks import Strut
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
+from pneumo_ros.effects.shapes.outside import kept
 
 PLACES = ("body_pitch", "body_heave")
 INERTIA = EffectParameter("added_inertia", "kg m2", -2.0, 4.0, 0.1, size=True, spread=SPREAD)
@@ -40,19 +41,13 @@ def start_level(front: Strut, rear: Strut, p: Values) -> tuple[float]:
 
 
 @njit(cache=True, error_model="numpy")
-def kept_level(z: tuple[float], front: Strut, rear: Strut, dt: float, p: Values) -> tuple[float]:
-    """Nothing is forgotten."""
-    return z
-
-
-@njit(cache=True, error_model="numpy")
 def tip(front: Strut, rear: Strut, z: tuple[float], p: Values) -> tuple[float, float]:
     """Upwards on the body where it stands higher, downwards where lower."""
     push = p[2] * (_raised(front, rear) - z[0])
     return push, -push
 
 
-TERM = PlantTerm(states=1, start=start_level, advance=kept_level, body=tip, shared=True)
+TERM = PlantTerm(states=1, start=start_level, advance=kept, body=tip, shared=True)
 
 
 def loaded(plant: Plant, ends: Ends, values: Values) -> Plant:
