@@ -65,6 +65,7 @@ class PlantTerm:
     body : (strut_front, strut_rear, z, p) -> N upwards on the body alone above each axle; only for the whole rig
     struts : (strut_front, strut_rear, z, p) -> N added to each spring's force; only for the whole rig
     ground : (tyre_front, tyre_rear, z, p) -> N upwards on each axle, as a tyre's; only for the whole rig
+    airs : (air_front, air_rear, z, p) -> Pa/s, added to each spring's dP/dt; only for the whole rig
     shared : the term belongs to the rig, not to one end: advance is (z, front, rear, dt, p), start (front, rear, p),
         of the struts for a term with ``body`` or ``struts``, the tyres with ``ground``, else the air
     """
@@ -79,12 +80,13 @@ class PlantTerm:
     body: Compiled | None = None
     struts: Compiled | None = None
     ground: Compiled | None = None
+    airs: Compiled | None = None
     shared: bool = False
 
     @property
     def functions(self) -> dict[str, Compiled]:
         """Hook name -> function, of those it has."""
-        names = ("start", "advance", "force", "tyre", "air", "supply", "body", "struts", "ground")
+        names = ("start", "advance", "force", "tyre", "air", "supply", "body", "struts", "ground", "airs")
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 
     @property
@@ -267,6 +269,7 @@ def _added(slots: Sequence[Slot]) -> str:
         "body": ("strut", ("spring", "tyre")),
         "struts": ("strut", ("spring",)),
         "ground": ("tyre", ("tyre",)),
+        "airs": ("air", ("air",)),
     }
     sums = [f"{name}_{side}" for name in ("spring", "air", "tyre") for side in "fr"]
     lines = [f"{', '.join(sums)}, heave, pitch = loads"]

@@ -121,6 +121,7 @@ TIES = {
         Axis("force on the front spring", "N"),
     ),
 }  # fmt: skip
+EXCHANGED = (Axis("front pressure over the rear one", "Pa"), Axis("mass flow into the front spring", "kg/s"))
 STEPS = ("valve_lag", "transport_delay", "exciter_lag", "pressure_lag")
 OPENINGS = ("valve_deadband", "anything.valve")
 
@@ -154,6 +155,10 @@ def curve_of(
         x, y = TIES[family]
         ends = _rows(model, record, nuisance, active, "front", False)
         found = lambda parts: _tied(model, parts[0], ends)  # noqa: E731
+    elif family == "anything.pipe":
+        x, y = EXCHANGED
+        both = _rows(model, record, nuisance, active, "front", False)
+        found = lambda parts: _exchanged(model, parts[0], both)  # noqa: E731
     elif family in RINGS:
         x, y = RINGS[family]
         stiffness = model.plant(nuisance, active).body.tyre_stiffness_front
@@ -297,6 +302,16 @@ def _tied(model: Running, part: Active, run: _Run) -> tuple[Array, Array]:
     moved = [term.start(*both, values)[0] - began[0] for both in ends]
     forces = np.array([hook(*both, began, values) for both in ends])
     return np.array(moved), forces.sum(axis=1) if term.body is not None else forces[:, 0]
+
+
+def _exchanged(model: Running, part: Active, run: _Run) -> tuple[Array, Array]:
+    """Pressure that drives air to the rear spring, and what the front one gains by it."""
+    term, values = model.library[part.effect].term, _values(model, part)
+    assert term is not None and term.airs is not None
+    gained = np.array([term.airs(front.air, rear.air, (), values)[0]
+                       for front, rear in zip(run.one, run.other, strict=True)])  # fmt: skip
+    over = [front.air.pressure - rear.air.pressure for front, rear in zip(run.one, run.other, strict=True)]
+    return np.array(over), _flow(run.one, gained)
 
 
 def _output(term: PlantTerm, row: _Row, z: Any, values: tuple[float, ...]) -> float:

@@ -10,14 +10,14 @@ import pytest
 from helpers.rig_logs import signals_of, simulated
 
 from pneumo_ros.effects.curves import SWEPT, ringing
-from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.hooks import Air, Strut, Tyre, air_of
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.effects.shapes import outside
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.rig import load_rig
 from pneumo_ros.rig.channels import CHANNELS
-from pneumo_ros.units import GRAVITY
+from pneumo_ros.units import GAS_CONSTANT, GRAVITY
 
 STEP = 1e-4  # s
 STIFFNESS, LOAD = 2e4, 290.0  # N/m, N
@@ -95,6 +95,38 @@ def test_a_bar_works_against_a_difference_of_heights_and_stores_what_it_takes() 
         front, rear = (run[:, top] - run[:, axle] for top, axle in heights)
         moved.append(np.std(front - rear))
     assert moved[1] < 0.2 * moved[0], "a stiff bar keeps the struts alike"
+
+
+def air_at(model: RigModel, pressure: float) -> Air:
+    gas = model.plant(None, ()).front
+    return air_of(pressure, 0.05, 0.0, 0.0, 0.0, gas.supply_pressure, gas.supply_power, gas)
+
+
+# Over what a hole of the same size lets out, choked: ISO 6358 at 0.65 of the pressure; (P1^2 - P2^2) / (2 P1 3 bar)
+@pytest.mark.parametrize("values, share", [((2e-7, 0.0), 0.97), ((0.0, 2e-7), 0.41)], ids=["hole", "gap"])
+def test_what_one_spring_loses_through_a_pipe_the_other_gains(values: tuple[float, float], share: float) -> None:
+    model = RigModel(load_rig())
+    high, low = air_at(model, 4.3e5), air_at(model, 2.8e5)
+    flows = []
+    for front, rear in ((high, low), (low, high), (low, low)):
+        rates = outside.exchange(front, rear, (), values)
+        mass = [rate * air.volume / (air.exponent * GAS_CONSTANT * air.temperature)
+                for rate, air in zip(rates, (front, rear), strict=True)]  # fmt: skip
+        assert sum(mass) == pytest.approx(0.0, abs=1e-15)
+        flows.append(mass[1])
+    assert flows[0] > 0.0 and flows[1] == pytest.approx(-flows[0]) and flows[2] == 0.0
+    assert flows[0] / (2e-7 * high.escape) == pytest.approx(share, rel=0.02)
+
+
+def test_springs_that_share_their_air_come_to_one_pressure() -> None:
+    log, model = signals_of(*simulated(seconds=3.0)), RigModel(load_rig())
+    runs = [model.simulate(log, active=a) for a in ((), (Active("anything.pipe", "", (2e-5, 0.0)),))]
+    front, rear = (CHANNELS.index(f"{end}_pressure") for end in ("front", "rear"))
+    apart = [abs(float(np.mean(run[-50:, front] - run[-50:, rear]))) for run in runs]
+    assert apart[1] < 0.2 * apart[0]
+    own = [Active("anything.pipe", "", (2e-7, 0.0))]
+    found = model.curve(log, np.array([p.nominal for p in model.parameters]), own, own, np.zeros((2, 2)))
+    assert found is not None and np.all(found.points[:, 0] * found.points[:, 1] < 0.0), "air goes to the lower pressure"
 
 
 @pytest.mark.parametrize("place", ["body_heave", "body_pitch", "road_input"])

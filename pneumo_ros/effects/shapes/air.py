@@ -18,13 +18,14 @@ from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.library.leak import LAMINAR, REFERENCE
+from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, Term
 from pneumo_ros.laws.flow import gap_over_hole, relieved
 from pneumo_ros.laws.memory import relaxed
 from pneumo_ros.plant.air_spring import MEAN_AREA
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, INCH
 
-OPENS = (2.5e5, 3.5e5)  # Pa above which a leak begins
+OPENING = 5e4  # Pa above the opening at which a leak that opens has its area
 USUAL = 1e-3  # kg/s, a valve's usual flow
 MIDDLE = 1.8 * INCH  # m
 SWING = 5e-3  # m
@@ -36,7 +37,9 @@ SETTLES = (3.0, 12.0)  # s after a session's begin in which an orifice changes, 
 ATOMS = (
     Atom("leak hole", "m2", 2e-7),
     Atom("leak gap", "m2", 2e-7),
-    *(Atom(f"leak above {p:g} Pa", "m2", 2e-7) for p in OPENS),
+    Atom("leak that opens", "m2", 1e-7),
+    # Fitted, for ramps with fixed corners are no ramp between them; from zero, for "anything" has ramps as well.
+    EffectParameter("opens", "1", -0.6, 1.0, 0.02, starts=(-0.1, 0.1)),
     Atom("inlet", "1", 0.05, signed=True),
     Atom("inlet over ratio", "1", 0.05, signed=True),
     Atom("inlet over flow", "1", 0.05, signed=True),
@@ -53,7 +56,7 @@ ATOMS = (
     *(Atom(f"exponent {v:g} m/s", "1", 0.03) for v in SLOW),
     *(Atom(f"later {where} {t:g} s", "1", 0.05) for where in ("outlet", "inlet") for t in SETTLES),
 )
-State = tuple[float, float, float, float, float, float]
+State = tuple[float, float, float, float, float, float, float]
 Values = tuple[float, ...]
 # A shape is no law whose last digit means anything: sums in any order, divisors turned over once, half the time.
 LOOSE = {"arcp", "contract", "reassoc"}
@@ -61,9 +64,9 @@ LOOSE = {"arcp", "contract", "reassoc"}
 
 @njit(cache=True, error_model="numpy")
 def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
-    """Air and wall at the supply's temperature, orifices as they were."""
+    """Air and wall at the supply's temperature, orifices as they were, and the pressure that the session began with."""
     t = air.temperature
-    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t, 0.0, 0.0)
+    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t, 0.0, 0.0, air.pressure)
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
@@ -74,6 +77,7 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
         max(z[0] + dt * (air.inflow - air.outflow), 1e-7), relaxed(z[1], t, dt, MEMORIES[0]),
         relaxed(z[2], t, dt, MEMORIES[1]), relaxed(z[3], t, dt, MEMORIES[2]),
         relaxed(z[4], 1.0, dt, SETTLES[0]), relaxed(z[5], 1.0, dt, SETTLES[1]),
+        z[6],
     )  # fmt: skip
 
 
@@ -84,7 +88,7 @@ def air(air: Air, z: State, p: Values) -> float:
     cold = math.sqrt(air.supply_temperature / t)
     gap = gap_over_hole(air.pressure, ATMOSPHERE, LAMINAR) * cold
     leak = p[0] + p[1] * gap
-    leak += p[2] * relieved(air.pressure, 2.5e5) / 1e5 + p[3] * relieved(air.pressure, 3.5e5) / 1e5
+    leak += p[2] * relieved(air.pressure, (1.0 + p[3]) * z[6]) / OPENING
     flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
     flow -= air.outflow * (p[7] + p[8] * (ATMOSPHERE / air.pressure - 0.5)) + leak * air.escape
     flow += p[18] + air.inflow * (p[23] * z[4] + p[24] * z[5]) - air.outflow * (p[21] * z[4] + p[22] * z[5])
@@ -100,9 +104,9 @@ def air(air: Air, z: State, p: Values) -> float:
     return (air.exponent * through * flow + (air.exponent - 1.0) * heat) / air.volume - extra * nominal
 
 
-AIR = Term("air", PlantTerm(states=6, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
+AIR = Term("air", PlantTerm(states=7, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
-    AIR.shape("leak", ["leak"], "a leak of any law: grows with the pressure"),
+    AIR.shape("leak", ["leak", "opens"], "a leak of any law: grows with the pressure", alone=("leak that opens",)),
     AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),
     AIR.shape(
         "heat_transfer",

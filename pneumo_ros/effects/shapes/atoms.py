@@ -42,12 +42,13 @@ class Term:
     Attributes
     ----------
     name : of its place in the kernel
+    atoms : among them numbers that bend one and are fitted with it, for a shape alone
     sites, places : as of :class:`~pneumo_ros.effects.contract.Effect`
     """
 
     name: str
     term: PlantTerm
-    atoms: tuple[Atom, ...]
+    atoms: tuple[Atom | EffectParameter, ...]
     sites: tuple[str, ...]
     places: tuple[str, ...]
 
@@ -61,7 +62,7 @@ class Term:
 
     def anything(self) -> Effect:
         """Every atom with either sign."""
-        columns = tuple(range(len(self.atoms)))
+        columns = tuple(k for k, atom in enumerate(self.atoms) if isinstance(atom, Atom))
         return self._effect(f"anything.{self.name}", columns, "whatever acts there", every_sign=True)
 
     def _effect(self, name: str, columns: tuple[int, ...], summary: str, every_sign: bool) -> Effect:
@@ -70,8 +71,10 @@ class Term:
                       columns=columns)  # fmt: skip
 
 
-def amplitude(atom: Atom, every_sign: bool = False) -> EffectParameter:
-    """The parameter that an atom's amplitude is."""
+def amplitude(atom: Atom | EffectParameter, every_sign: bool = False) -> EffectParameter:
+    """The parameter that an atom's amplitude is; a number that bends one is a parameter itself."""
+    if isinstance(atom, EffectParameter):
+        return atom
     high = LARGEST * atom.typical
     low = -high if atom.signed or every_sign else 0.0
     return EffectParameter(atom.name, atom.unit, low, high, atom.typical, size=True, spread=SPREAD)

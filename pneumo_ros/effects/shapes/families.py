@@ -19,6 +19,7 @@ ANYTHING: dict[str, tuple[str, ...]] = {
     "body_pitch": ("anything.body", "anything.bar"),
     "road_input": ("anything.ground",),
 }
+BETWEEN = {"air": "anything.pipe"}  # kind of place -> what ties it to its kind at the other end
 
 
 def anything_at(place: str) -> tuple[tuple[str, str], ...]:
@@ -29,4 +30,5 @@ def anything_at(place: str) -> tuple[tuple[str, str], ...]:
     if place in ANYTHING:
         return tuple((effect, "") for effect in ANYTHING[place])
     end, _, kind = place.rpartition("_")
-    return tuple((effect, end) for effect in ANYTHING.get(kind, ()))
+    own = tuple((effect, end) for effect in ANYTHING.get(kind, ()))
+    return (*own, (BETWEEN[kind], "")) if kind in BETWEEN else own

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What may act where no family has a place: at the body, between the struts, and in the ground under the wheels.
+"""What may act where no family has a place: at the body, between struts or springs, and in the ground under the wheels.
 
 These are no shapes of a family but ceilings: what a name is held against whose motion may also come from there, as a
 narrow answer of the rig to the road looks alike wherever it rings.
@@ -12,7 +12,8 @@ q_1'' = w^2 (F - q_1) - 2 zeta w q_1', and is shaken by what moves the road r by
 
 What holds the body from outside, a cable or a guide, pulls with k_+ or k_- at its point above or below a height y_0,
 and with c y'. A bar between the struts gives the front spring -k (h_f - h_r - d) and the rear one as much upwards,
-where d is the difference of heights at the first instant.
+where d is the difference of heights at the first instant. A pipe between the springs lets air through from the higher
+pressure to the lower: as a hole and as a long gap.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -25,10 +26,13 @@ from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import RIG, Effect, Ends, Plant, Values
-from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.library.leak import REFERENCE
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import SPREAD
+from pneumo_ros.laws.flow import through_gap, through_hole
 from pneumo_ros.laws.ringing import pulled, swung
+from pneumo_ros.units import GAS_CONSTANT
 
 Swing = tuple[float, float]
 Shaken = tuple[float, float, float, float]
@@ -129,6 +133,17 @@ def tie(front: Strut, rear: Strut, z: tuple[float], p: Values) -> tuple[float, f
     return -pull, pull
 
 
+@njit(cache=True, error_model="numpy")
+def exchange(front: Air, rear: Air, z: tuple[float, ...], p: Values) -> tuple[float, float]:
+    """Pressure rates by what the front spring gives to the rear one."""
+    flow = p[0] * through_hole(front.pressure, rear.pressure, True)
+    flow += p[1] * through_gap(front.pressure, rear.pressure, True, REFERENCE)
+    # kg/s through a hole of 1 m2 for each Pa, by the temperature of where it comes from
+    flow *= front.escape / front.pressure if front.pressure > rear.pressure else rear.escape / rear.pressure
+    lost = front.exponent * GAS_CONSTANT * front.temperature * flow / front.volume
+    return -lost, rear.exponent * GAS_CONSTANT * rear.temperature * flow / rear.volume
+
+
 EFFECTS = (
     Effect(
         id="anything.body",
@@ -183,5 +198,15 @@ EFFECTS = (
             EffectParameter("bar_damping", "N s/m", -500.0, 500.0, 5.0, size=True, spread=SPREAD),
         ),
         term=PlantTerm(states=1, start=start_tied, advance=kept, struts=tie, shared=True),
+    ),
+    Effect(
+        id="anything.pipe",
+        summary="air that goes from one spring to the other",
+        sites=RIG,
+        places=("front_air", "rear_air"),
+        parameters=tuple(
+            EffectParameter(name, "m2", -4e-5, 4e-5, 2e-7, size=True, spread=SPREAD) for name in ("hole", "gap")
+        ),
+        term=PlantTerm(airs=exchange, shared=True),
     ),
 )
