@@ -37,6 +37,7 @@ ENOUGH: Final = 20  # samples that have a slope [numerics]
 TRACE: Final = 0.05  # of the floor's mean square: a structure that leaves less leaves nothing [taste]
 # Share (rms) of the refit's gap, both above the floor, from which on a structure leaves much [taste]
 LEFT: Final = 0.08
+TIED: Final = "-"  # joins two places to the name of what ties them together
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -248,7 +249,7 @@ def _beside(
     problem: Problem, best: Fit, holdout: Record, floor: float, one: EffectEvidence, rest: Remainder
 ) -> EffectEvidence:
     """The evidence with what is missed of an effect once something acts where the rest lies."""
-    if set(one.places) & set(rest.places) or one.without <= one.own:
+    if set(_whatever(problem, one.places)) & set(rest.parts) or one.without <= one.own:  # its own ceiling
         return one
     bare = reduced(problem, rest.fit, of_law(best.candidate, one.law), STEPS, _all(problem))
     left = _above(held_by(problem, bare, holdout).total, floor) if not bare.diverged else np.inf
@@ -305,7 +306,8 @@ def _instead(
     bare = _fitted(problem, reduced(problem, best, gone, STEPS, _all(problem)))
     found = with_parts(problem, bare, parts, INSTEAD, _all(problem)) if parts else bare
     total = held_by(problem, found, holdout).total
-    return Remainder(where, parts, found, _above(total, floor), total)
+    places = tuple(dict.fromkeys(place for one in where for place in one.split(TIED)))
+    return Remainder(places, parts, found, _above(total, floor), total)
 
 
 def _whatever(problem: Problem, where: tuple[str, ...]) -> tuple[Part, ...]:

@@ -18,6 +18,7 @@ EFFECT = Effect(
     summary="volume of hose and fittings beside the spring's own",
     sites=ENDS,
     places=("{end}_air",),
+    elsewhere=("front_air-rear_air",),
     parameters=(
         EffectParameter(
             "dead_volume",

@@ -47,6 +47,7 @@ EFFECT = Effect(
     summary="the air exchanges heat with the bellows' wall, so that slow strokes are nearly isothermal",
     sites=ENDS,
     places=("{end}_air",),
+    elsewhere=("front_air-rear_air",),
     parameters=(
         EffectParameter(
             "wall_conductance",

@@ -9,7 +9,7 @@ from pneumo_ros.effects.shapes import air, body, force, mode, outside, signals, 
 SHAPES: dict[str, Effect] = {
     effect.id: effect for room in (body, force, mode, air, tyre, supply, signals, outside) for effect in room.EFFECTS
 }
-# Kind of place (its end as the site), or place of the whole rig -> what may act there.
+# Kind of place (its end as the site), place of the whole rig, or two that are tied together -> what may act there.
 ANYTHING: dict[str, tuple[str, ...]] = {
     "force": ("anything.force",),
     "air": ("anything.air", "anything.valve"),
@@ -18,8 +18,8 @@ ANYTHING: dict[str, tuple[str, ...]] = {
     "body_heave": ("anything.body", "anything.held"),
     "body_pitch": ("anything.body", "anything.bar"),
     "road_input": ("anything.ground",),
+    "front_air-rear_air": ("anything.pipe",),
 }
-BETWEEN = {"air": "anything.pipe"}  # kind of place -> what ties it to its kind at the other end
 
 
 def anything_at(place: str) -> tuple[tuple[str, str], ...]:
@@ -30,5 +30,4 @@ def anything_at(place: str) -> tuple[tuple[str, str], ...]:
     if place in ANYTHING:
         return tuple((effect, "") for effect in ANYTHING[place])
     end, _, kind = place.rpartition("_")
-    own = tuple((effect, end) for effect in ANYTHING.get(kind, ()))
-    return (*own, (BETWEEN[kind], "")) if kind in BETWEEN else own
+    return tuple((effect, end) for effect in ANYTHING.get(kind, ()))

@@ -98,6 +98,22 @@ def test_an_outlet_that_ices_is_no_sensor_that_is_off(model: RigModel, site: str
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["heat_transfer", "leak"])
+def test_air_between_the_springs_is_no_loss_of_either(model: RigModel, name: str) -> None:
+    start = tuple(p.typical for p in model.effects[name].parameters)
+    found = called(model, Active("anything.pipe", "", (2e-7, 0.0)), ((name, "both"),), start)
+    assert found.remainders[0].places == ("front_air", "rear_air")
+    assert found.remainders[0].parts == (("anything.pipe", ""),)
+    assert likely(found) < 0.05
+
+
+@pytest.mark.slow
+def test_a_leak_keeps_its_name_beside_air_between_the_springs(model: RigModel) -> None:
+    name = ("leak", "both")
+    assert likely(called(model, Active(*name, (3e-7, 0.5)), (name,), (2e-7, 0.6))) > 0.9
+
+
+@pytest.mark.slow
 def test_a_sensor_that_is_off_keeps_its_name(model: RigModel) -> None:
     name = ("pressure_offset", "rear_pressure")
     assert likely(called(model, Active(*name, (4e3,)), (name,), (2e3,))) > 0.9
