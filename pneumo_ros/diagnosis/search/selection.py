@@ -116,7 +116,7 @@ class Scored:
     stretch : sum of squares of the nuisance parameters, in prior sigmas
     samples : effective number of fitted samples, what the training cost grows with
     fitted : robust mean square of the fitted samples, in the same way
-    strain : what the unknowns' prior adds to the training cost
+    strain : what the prior of initial state and effects adds to the training cost
     """
 
     fit: Fit
@@ -160,10 +160,11 @@ def score(problem: Problem, fit: Fit) -> Scored:
         rows = problem.block == number
         blocks.append(squares[rows].sum(axis=0) / np.maximum(1, there[rows].sum(axis=0)))
     left = np.array(blocks) if blocks else np.mean(squares, axis=0)[None]
-    stretch = float(np.sum(fit.x[: len(problem.model.parameters)] ** 2))
+    count = len(problem.model.parameters)
+    stretch = float(np.sum(fit.x[:count] ** 2))
     samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
     fitted = level(fit.residual[problem.fitted])
-    strain = float((problem.prior(fit.candidate) * fit.x) @ fit.x)
+    strain = float((problem.prior(fit.candidate) * fit.x)[count:] @ fit.x[count:])
     return Scored(fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, float(samples), fitted, strain)
 
 
@@ -181,15 +182,16 @@ def noise_level(problem: Problem) -> float:
 
 
 def log_weight(one: Scored, refit: Scored) -> float:
-    """Of a structure among others with as many effects: what it leaves of fitted and kept samples, half and half, and
-    what it claims for that.
+    """Of a structure among others with as many effects: what it leaves of fitted and kept samples, half and half, what
+    it claims for that, and how unlikely the tolerances are that it needs.
 
     What laws of the right kind leave (:data:`ALIKE`, :data:`LAW_SHARE`) is added to both levels: two families that both
-    leave less are told apart by what they need for it alone.
+    leave less are told apart by what they need for it alone. The tolerances count in full, as the normal distributions
+    that the maker states, for no error of a law moves the rig's own numbers.
     """
     pairs = ((refit.fitted, one.fitted), (refit.level, one.level))
     left = [float(np.log(ALIKE + LAW_SHARE**2 * whole + level)) for whole, level in pairs]
-    return -SHARPNESS * (0.5 * sum(left) + one.strain / one.samples) - PER_UNKNOWN * one.claims
+    return -SHARPNESS * (0.5 * sum(left) + one.strain / one.samples) - 0.5 * one.stretch - PER_UNKNOWN * one.claims
 
 
 def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Scored]]:

@@ -80,6 +80,16 @@ def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() 
     assert far.verdict == "orifice_coefficient" and far.of("leak") < 1e-3
 
 
+def test_tolerances_that_are_stretched_count_as_the_maker_states_them() -> None:
+    """A family that leaves a little less by moving five numbers of the rig by two sigmas each is the less likely one."""
+    refit = scored(900.0, 1000.0)
+    leak = scored(1.0, 300.0, "leak")
+    heat = replace(scored(0.9, 295.0, "heat_transfer"), stretch=5 * 2.0**2)
+    assert log_weight(heat, refit) - log_weight(replace(heat, stretch=0.0), refit) == pytest.approx(-10.0)
+    assert select(refit, [leak, heat], Thresholds()) is leak
+    assert select(refit, [leak, replace(heat, stretch=0.0)], Thresholds()) is not leak
+
+
 def test_of_laws_that_cost_as_much_the_kept_blocks_choose() -> None:
     """Two laws of friction whose fits end a tenth apart, one of them in a local minimum that the kept blocks see."""
     refit, stuck = scored(380.0, 3000.0), scored(2.93, -600.1, "coulomb_friction.presliding")
