@@ -208,9 +208,11 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,
                max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0])]  # fmt: skip
-    # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it.
+    # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
+    # the run or, where that is led astray by what is left, in the rig's equations.
     if one.places[0].startswith(SENSOR):
-        against += [one.own / max(one.without - one.own, 1e-12), 1.0 / max(one.follows, 1e-9)]
+        held_alone = min(one.own / max(one.without - one.own, 1e-12), 1.0 / max(one.held_up, 1e-9))
+        against += [held_alone, 1.0 / max(one.follows, 1e-9)]
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

@@ -81,7 +81,7 @@ def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() 
 
 
 def test_tolerances_that_are_stretched_count_as_the_maker_states_them() -> None:
-    """A family that leaves a little less by moving five numbers of the rig by two sigmas each is the less likely one."""
+    """What leaves a little less by moving five numbers of the rig by two sigmas each is the less likely one."""
     refit = scored(900.0, 1000.0)
     leak = scored(1.0, 300.0, "leak")
     heat = replace(scored(0.9, 295.0, "heat_transfer"), stretch=5 * 2.0**2)
@@ -202,13 +202,21 @@ def test_what_bends_a_shape_counts_the_more_the_more_is_left(left: float, named:
 
 
 @pytest.mark.parametrize(
-    ("place", "own", "named"),
-    [("sensor:sprung_front", 0.3, True), ("sensor:sprung_front", 0.8, False), ("front_force", 0.8, True)],
+    ("place", "own", "missing", "named"),
+    [
+        ("sensor:sprung_front", 0.3, None, True),
+        ("sensor:sprung_front", 0.8, None, False),
+        ("sensor:sprung_front", 0.8, (20.0, 15.0), False),
+        ("sensor:sprung_front", 0.8, (20.0, 2000.0), True),
+        ("front_force", 0.8, None, True),
+    ],
 )
-def test_a_sensor_error_must_hold_more_than_is_left(place: str, own: float, named: bool) -> None:
-    """What moves the rig looks like an error of a sensor as well."""
+def test_a_sensor_error_must_hold_more_than_is_left(
+    place: str, own: float, missing: tuple[float, float] | None, named: bool
+) -> None:
+    """What moves the rig looks like an error of a sensor as well; in the rig's equations it does not."""
     refit, chosen = scored(400.0, 3000.0), scored(60.0, 1000.0, "lvdt_offset", unknowns=36)
-    found = [replace(one, places=(place,)) for one in evidence(chosen, 1.0, own, own)]
+    found = [replace(one, places=(place,), missing=missing) for one in evidence(chosen, 1.0, own, own)]
     told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 20.0 * own), found)
     assert told.verdict == ("lvdt_offset" if named else "unknown")
 
