@@ -67,7 +67,7 @@ class Air(NamedTuple):
 class Tyre(NamedTuple):
     """One tyre: compression m (road above axle datum), its rate m/s, nominal force N (positive upwards on the axle),
     middle m and its rate m/s as of the strut, compression m and load N at rest, height of the road under it m and
-    its rate m/s."""
+    its rate m/s, height of the strut above it m and its rate m/s."""
 
     compression: float
     rate: float
@@ -78,6 +78,8 @@ class Tyre(NamedTuple):
     load: float
     road: float
     slope: float
+    height: float = 0.0
+    height_rate: float = 0.0
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,8 +126,9 @@ def tyre_of(
     """The nominal tyre below a strut."""
     middle, rate = 0.5 * (top + axle), 0.5 * (top_rate + axle_rate)
     return Tyre(
-        road - axle, slope - axle_rate, stiffness * (road - axle), middle, rate, load / stiffness, load, road, slope
-    )
+        road - axle, slope - axle_rate, stiffness * (road - axle), middle, rate, load / stiffness, load, road, slope,
+        top - axle, top_rate - axle_rate,
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")

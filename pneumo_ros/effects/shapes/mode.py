@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a moving part of the bellows may do beside the library's law: swing against the ground, and weigh.
+"""What a moving part of the bellows may do beside the library's law: swing against the ground, weigh, and stiffen.
 
-A part of mass m that hangs between both plates by springs: q'' = w^2 (h - q) + 2 zeta w ((1 - g) h' - q'), with h
-half-way between body and axle; each plate gets half of -m (w^2 (h - q) + 2 zeta w (1 - g) (h' - q')) and of what it
-weighs beyond the nominal masses. The share g of the damping is against the ground, the rest acts between part and
-plates. The law of :mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut, where its inertia
-pushes the plates apart; the real ones are anything between the two. No cone: frequency and damping are fitted as well.
+A part of mass m hangs by springs on r = i h + (1 - i) y, between the strut's height h and the point y half-way between
+body and axle: q'' = w^2 e (1 + s e^2) + 2 zeta w ((1 - g) r' - q') with e = r - q. The body gets (1 + i)/2 and the axle
+(1 - 3 i)/2 of -m (w^2 e (1 + s e^2) + 2 zeta w (1 - g) (r' - q')), each half of what the part weighs beyond the
+nominal masses; both are the force along r, by virtual work. The share g of the damping is against the ground, the rest
+acts between part and plates. The law of :mod:`pneumo_ros.effects.library.bellows_mode` holds the part inside the strut
+(i = 1), where its inertia pushes the plates apart, on a spring of constant stiffness (s = 0; Duffing 1918 for others).
+No cone: frequency, damping, place and stiffening are fitted as well.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -24,44 +26,59 @@ from pneumo_ros.effects.shapes.atoms import SPREAD
 from pneumo_ros.laws.ringing import pulled, swung
 
 State = tuple[float, float]
-Values = tuple[float, float, float, float, float]
+Values = tuple[float, float, float, float, float, float, float]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _hung(height: float, middle: float, inside: float) -> float:
+    """What the part hangs on, m, from the strut's height and its middle; or how fast, from their rates."""
+    return inside * height + (1.0 - inside) * middle
 
 
 @njit(cache=True, error_model="numpy")
 def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
     """Where the part is and how fast: with its plates."""
-    return (strut.middle, strut.middle_rate)
+    return _hung(strut.height, strut.middle, p[5]), _hung(strut.rate, strut.middle_rate, p[5])
 
 
 @njit(cache=True, error_model="numpy")
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
-    """Exact damped oscillation about plates that move at held speed; half a step behind them, as every term."""
-    return swung(z[0], z[1], strut.middle, strut.middle_rate, 2.0 * math.pi * p[1], p[2], p[4], dt)
+    """Exact damped oscillation about plates that move at held speed, half a step behind them as every term; what its
+    spring stiffens by is an impulse at the end of the step.
+    """
+    w, to = 2.0 * math.pi * p[1], _hung(strut.height, strut.middle, p[5])
+    rate = _hung(strut.rate, strut.middle_rate, p[5])
+    q, v = swung(z[0], z[1], to, rate, w, p[2], p[4], dt)
+    stretch = to + 0.5 * dt * rate - q
+    return q, v + dt * w * w * p[6] * stretch * stretch * stretch
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _on_each(middle: float, rate: float, z: State, p: Values) -> float:
-    """N upwards on each plate; ``middle`` between the plates, m, and its ``rate``, m/s."""
-    w = 2.0 * math.pi * p[1]
-    return 0.5 * (p[0] * pulled(z[0] - middle, z[1] - rate, w, p[2], 1.0 - p[4]) - p[3])
+def _pull(to: float, rate: float, z: State, p: Values) -> float:
+    """N with which the part pulls what it hangs on, m and m/s, towards itself."""
+    w, stretch = 2.0 * math.pi * p[1], to - z[0]
+    stiffer = w * w * p[6] * stretch * stretch * stretch
+    return p[0] * (pulled(stretch, rate - z[1], w, p[2], 1.0 - p[4]) + stiffer)
 
 
 @njit(cache=True, error_model="numpy")
 def force(strut: Strut, z: State, p: Values) -> float:
     """On the body, and as a spring's its opposite on the axle."""
-    return _on_each(strut.middle, strut.middle_rate, z, p)
+    to, rate = _hung(strut.height, strut.middle, p[5]), _hung(strut.rate, strut.middle_rate, p[5])
+    return -0.5 * ((1.0 + p[5]) * _pull(to, rate, z, p) + p[3])
 
 
 @njit(cache=True, error_model="numpy")
 def tyre(tyre: Tyre, z: State, p: Values) -> float:
     """On the axle: its own share, and what :func:`force` has taken from it."""
-    return 2.0 * _on_each(tyre.middle, tyre.middle_rate, z, p)
+    to, rate = _hung(tyre.height, tyre.middle, p[5]), _hung(tyre.height_rate, tyre.middle_rate, p[5])
+    return -((1.0 - p[5]) * _pull(to, rate, z, p) + p[3])
 
 
 EFFECTS = (
     Effect(
         id="bellows_mode.shape",
-        summary="a moving part of the bellows of any law: it may swing against the ground, and weigh",
+        summary="a moving part of the bellows of any law: it may swing against the ground, weigh, and stiffen",
         sites=ENDS,
         places=("{end}_force", "{end}_tyre"),
         parameters=(
@@ -70,6 +87,8 @@ EFFECTS = (
             EffectParameter("mode_damping_ratio", "1", 0.01, 0.25, 0.08),
             EffectParameter("weight", "N", -20.0, 20.0, 2.0, size=True, spread=SPREAD),
             EffectParameter("ground_share", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0)),
+            EffectParameter("inside", "1", 0.0, 1.0, 0.5, ends=(0.0, 1.0), starts=(0.0, 1.0)),
+            EffectParameter("stiffening", "1/m2", 0.0, 1e6, 5e4),
         ),
         term=PlantTerm(states=2, start=start, advance=advance, force=force, tyre=tyre),
         screened=(0,),
