@@ -37,7 +37,7 @@ ENOUGH: Final = 20  # samples that have a slope [numerics]
 TRACE: Final = 0.05  # of the floor's mean square: a structure that leaves less leaves nothing [taste]
 # Share (rms) of the refit's gap, both above the floor, from which on a structure leaves much [taste]
 LEFT: Final = 0.08
-TIED: Final = "-"  # joins two places to the name of what ties them together
+TIED: Final = "-"  # joins two places to the name of what ties them together [definition]
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
