@@ -10,9 +10,10 @@ from scipy.optimize import lsq_linear
 
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.contract import Effect, Ends, Inputs
-from pneumo_ros.effects.hooks import Strut, Tyre
+from pneumo_ros.effects.hooks import Strut, Tyre, air_of
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.effects.shapes import air as airs
 from pneumo_ros.effects.shapes import tyre as tyres
 from pneumo_ros.effects.shapes.families import SHAPES
 from pneumo_ros.effects.shapes.force import SLACKS
@@ -172,3 +173,30 @@ def test_what_tips_presses_with_a_moment_in_proportion_to_pitch(effect: str, val
 
 def model_centre(model: RigModel) -> np.ndarray:
     return np.array([p.nominal for p in model.parameters])
+
+
+@pytest.mark.parametrize("end", ["front", "rear"])
+@pytest.mark.parametrize("margin", [-0.06, -0.02, 0.03])
+def test_a_lip_that_opens_above_a_pressure_is_a_leak_wherever_the_spring_rests(end: str, margin: float) -> None:
+    """Flow in proportion to what the pressure exceeds; the opening is fitted, the corners of an outlet's error are
+    none.
+    """
+    rest = RESTS[4 if end == "front" else 5]
+    gas = getattr(RigModel(load_rig()).plant(), end)
+    pressures = np.linspace(0.8 * rest, 1.25 * rest, 120)
+    signals = [air_of(float(p), 0.045, 0.0, 0.0, 0.0, gas.supply_pressure, gas.supply_power, gas) for p in pressures]
+    law = -1e-9 * np.maximum(pressures - (1.0 + margin) * rest, 0.0)  # kg/s
+
+    def flows(opens: float) -> np.ndarray:
+        z = (rest * signals[0].volume, *[signals[0].temperature] * 3, 0.0, 0.0, rest)
+        out = []
+        for column in SHAPES["leak.shape"].columns[:3]:
+            p = [0.0] * len(airs.ATOMS)
+            p[column], p[3] = 1.0, opens
+            out.append([airs.air(s, z, tuple(p)) * s.volume / (s.exponent * s.temperature) for s in signals])
+        return np.array(out).T
+
+    nothing = np.zeros((len(law), 1))
+    signed = signs(SHAPES["leak.shape"])[:3]
+    assert left_of(flows(0.0)[:, :2], signed[:2], law, nothing) > 0.25, "no hole and no gap opens"
+    assert left_of(flows(margin), signed, law, nothing) < 0.06  # a hole that opens lets pass the more, the higher it is
