@@ -6,11 +6,14 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
 
 import pytest
+from helpers.folders import ROOT
 
 from pneumo_ros.casemaker.plan import plan
 from pneumo_ros.cli.blind_work import make_case
@@ -48,6 +51,32 @@ def test_ctrl_c_ends_a_batch_whatever_code_it_meets(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         list(run_each(ctrl_c_in_compiled_code, [str(tmp_path)]))
     assert "ValueError" in next(iter(run_each(fail, [str(tmp_path)])))[1]
+
+
+BATCH = """
+import sys
+from helpers.arriving import Arriving
+from pneumo_ros.workers import run_each
+try:
+    list(run_each(print, [Arriving(sys.argv[1])], workers=2))
+except KeyboardInterrupt:
+    print("told")
+"""
+
+
+def test_workers_say_nothing_of_ctrl_c(tmp_path: Path) -> None:
+    """One that still imported, or waited for work, ended in a traceback."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "test")}
+    command = [sys.executable, "-c", BATCH, str(tmp_path)]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment, start_new_session=True
+    )
+    while not (tmp_path / "arrives").exists():
+        assert process.poll() is None
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    said, _ = process.communicate(timeout=30)
+    assert said == "told\n"
 
 
 def test_a_killed_local_worker_costs_a_restart_only(tmp_path: Path) -> None:
