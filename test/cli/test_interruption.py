@@ -22,6 +22,26 @@ def test_a_caught_interruption_of_generated_code_does_not_kill_the_process_at_it
     assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
 
 
+DROPPED = """
+import ctypes, os, signal, time
+from pneumo_ros.cli.interruption import interrupt
+signal.signal(signal.SIGINT, interrupt)
+compiler = {"__name__": "llvmlite.binding.executionengine", "os": os, "signal": signal}
+exec("def notify():\\n    os.kill(os.getpid(), signal.SIGINT)\\n    for _ in range(1000): pass", compiler)
+try:
+    ctypes.CFUNCTYPE(None)(compiler["notify"])()
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("caught")
+"""
+
+
+def test_an_interruption_that_meets_a_callback_of_the_compiler_is_not_lost() -> None:
+    """ctypes drops what is raised there: a batch went on to its end, exit code 0."""
+    done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
+
+
 LOADED = """
 import sys, signal
 before = set(sys.modules)
