@@ -13,7 +13,6 @@ NODES = ["road_profile", "plant", "daq", "estimator", "controller", "session_rec
 # `colcon test` looks for pytest in the extra of this name.
 TESTING = [
     "pytest>=7.4",
-    "pytest-rerunfailures>=12",
     "hypothesis>=6.98",
     "mcap-ros2-support>=0.5",
     "cobs>=1.2",

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from types import FrameType
 from typing import TypeVar
 
 from pneumo_ros.errors import InputError, is_interruption
@@ -54,7 +56,16 @@ def run_each(
 
 def _pool(workers: int) -> ProcessPoolExecutor:
     """Fresh interpreters: a fork would copy locks and threads of libraries in whatever state they are."""
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"), initializer=_heed_ctrl_c)
+
+
+def _heed_ctrl_c() -> None:
+    """A terminal sends it to workers too, whatever they do, waiting and importing included: the first process tells."""
+    signal.signal(signal.SIGINT, _end_at_once)
+
+
+def _end_at_once(number: int, frame: FrameType | None) -> None:
+    os._exit(128 + number)
 
 
 def _attempt(work: Callable[[Item], object], item: Item) -> str:

@@ -62,19 +62,10 @@ def pytest_sessionstart() -> None:
                 kept.unlink(missing_ok=True)
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Files with many slow tests come first, so that processes that share the files end together.
-
-    Real-time tests get two more tries: a stall of a shared machine is not the code's; the bounds stay. ROS distributes
-    no package of the plugin that repeats them: without it they have one try.
-    """
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with many slow tests come first, so that processes that share the files end together."""
     slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
     items.sort(key=lambda item: -slow[item.path])
-    if not config.pluginmanager.hasplugin("rerunfailures"):
-        return
-    for item in items:
-        if item.get_closest_marker("realtime"):
-            item.add_marker(pytest.mark.flaky(reruns=2, reruns_delay=1))
 
 
 def refuse_skip(report: Any, environment: str) -> None:

@@ -177,8 +177,14 @@ def run(
     rear: End,
     laws: NDArray[np.float64],
     surface: AreaSurface,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Simulate N periods.
+    states: NDArray[np.float64],
+    measured: NDArray[np.float64],
+    inlets: NDArray[np.float64],
+) -> None:
+    """Simulate N periods into ``states``, ``measured`` and ``inlets``, as of :class:`Run`.
+
+    They are not returned: Ctrl-C that came meanwhile is raised while numba makes Python's objects of what a compiled
+    function returns, and of several arrays it makes a tuple all the same, of one that is not there.
 
     Parameters
     ----------
@@ -193,7 +199,6 @@ def run(
     laws : second laws, (2, ROWS, COLUMNS)
     """
     count = road.shape[0] - 1
-    states, measured, inlets = np.empty((count + 1, SIZE)), np.empty((count + 1, 6)), np.empty((count + 1, 2))
     x, probe = x0.copy(), x0.copy()
     k1, k2, k3, k4 = np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE), np.zeros(SIZE)
     play = np.array([x[0] + front.arm * x[1], x[0] + rear.arm * x[1]])
@@ -243,7 +248,6 @@ def run(
                        surface)  # fmt: skip
             for m in range(SIZE):
                 x[m] += dt / 6.0 * (k1[m] + 2.0 * (k2[m] + k3[m]) + k4[m])
-    return states, measured, inlets
 
 
 def simulate(
@@ -259,21 +263,23 @@ def simulate(
     step: float = STEP,
 ) -> Run:
     """One session from rest; arguments as :func:`run`, ``step`` of the integrator in s."""
-    return Run(
-        *run(
-            rest.state,
-            np.ascontiguousarray(road, dtype=float),
-            np.ascontiguousarray(shake, dtype=float),
-            np.ascontiguousarray(noise, dtype=float),
-            NOT_GIVEN if given is None else np.ascontiguousarray(given, dtype=float),
-            rest.inlets,
-            rest.outlets,
-            (-float(rest.state[2]), -float(rest.state[3])),
-            period,
-            max(1, round(period / step)),
-            gains,
-            *rig[:3],
-            rig.rows,
-            surface,
-        )
+    samples = len(road)
+    out = Run(np.empty((samples, SIZE)), np.empty((samples, 6)), np.empty((samples, 2)))
+    run(
+        rest.state,
+        np.ascontiguousarray(road, dtype=float),
+        np.ascontiguousarray(shake, dtype=float),
+        np.ascontiguousarray(noise, dtype=float),
+        NOT_GIVEN if given is None else np.ascontiguousarray(given, dtype=float),
+        rest.inlets,
+        rest.outlets,
+        (-float(rest.state[2]), -float(rest.state[3])),
+        period,
+        max(1, round(period / step)),
+        gains,
+        *rig[:3],
+        rig.rows,
+        surface,
+        *out,
     )
+    return out

@@ -14,7 +14,8 @@ import typer
 from pneumo_ros.cli.app import App, program
 from pneumo_ros.cli.diagnose_against import check_against, fitted_half_car
 from pneumo_ros.cli.diagnosis_shown import progress_bar, show
-from pneumo_ros.cli.existing import Overwrite, refuse_old_diagnosis
+from pneumo_ros.cli.existing import Overwrite, claimed, refuse_old_diagnosis
+from pneumo_ros.cli.own_laws import own_laws
 from pneumo_ros.cli.rig_notes import tell_assumed
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
@@ -114,32 +115,31 @@ def diagnose(
     from pneumo_ros.diagnosis.report import Asked, claim_folder, write_outputs
     from pneumo_ros.rig import load_rig
 
-    claim_folder(output)
-    if save_rig is not None:
-        claim_folder(save_rig.parent)
-        if save_rig.is_dir():
-            raise InputError("is a folder", where=save_rig, key="--save-rig", remedy="name a file, RIG.yaml")
-    own = None if rig is None else load_rig(rig)
-    if own is not None:
-        tell_assumed(console, own, rig)
-    with ExitStack() as held:
+    with claimed(output), own_laws(effect or ()), ExitStack() as held:
+        if save_rig is not None:
+            claim_folder(save_rig.parent)
+            if save_rig.is_dir():
+                raise InputError("is a folder", where=save_rig, key="--save-rig", remedy="name a file, RIG.yaml")
+        own = None if rig is None else load_rig(rig)
+        if own is not None:
+            tell_assumed(console, own, rig)
         if against is not None:
             own = held.enter_context(fitted_half_car(console, against, own, effect or (), pairs))
         threads = os.cpu_count() or 1
         task = prepared(fit, holdout, own, edit, effect or (), without or (), threads)
-    options = Options(pairs=pairs, experiment=design_experiment, threads=threads)
-    with progress_bar(console) as progress:
-        bar = progress.add_task("diagnosing", total=1.0)
-        found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without), _bench(fit[0]), program())
-    files, first = write_outputs(output, found, task.model, task.fit, task.holdout, asked=asked)
-    if found.experiment is not None:
-        files += found.experiment.write(output)
-    if save_rig is not None:
-        files.append(save_corrected_rig(found, task.model, save_rig))
-    show(console, found, first)
-    for file in files:
-        console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
+        options = Options(pairs=pairs, experiment=design_experiment, threads=threads)
+        with progress_bar(console) as progress:
+            bar = progress.add_task("diagnosing", total=1.0)
+            found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
+        asked = Asked(tuple(fit), holdout, output, save_rig, _repeated(rig, effect, without), _bench(fit[0]), program())
+        files, first = write_outputs(output, found, task.model, task.fit, task.holdout, asked=asked)
+        if found.experiment is not None:
+            files += found.experiment.write(output)
+        if save_rig is not None:
+            files.append(save_corrected_rig(found, task.model, save_rig))
+        show(console, found, first)
+        for file in files:
+            console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _bench(log: Path) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pneumo_ros.cli.app import program
 from pneumo_ros.cli.diagnose_against import fitted_own
-from pneumo_ros.cli.existing import refuse_old_diagnosis
+from pneumo_ros.cli.existing import claimed, refuse_old_diagnosis
 from pneumo_ros.cli.patience import answered
 from pneumo_ros.cli.terminal import Console
 from pneumo_ros.errors import InputError
@@ -42,33 +42,32 @@ def diagnose_own(
     refuse_old_diagnosis(output, save_rig, overwrite, [rig_file_of(model, rig)])
     from pneumo_ros.cli.diagnosis_shown import progress_bar, show
     from pneumo_ros.diagnosis.diagnose import Options
-    from pneumo_ros.diagnosis.report import Asked, claim_folder
+    from pneumo_ros.diagnosis.report import Asked
     from pneumo_ros.own_rig import outputs
     from pneumo_ros.own_rig.experiment import design_own
     from pneumo_ros.own_rig.from_files import prepared
 
-    claim_folder(output)
-    rig_asked = rig
-    with ExitStack() as held:
+    with claimed(output), ExitStack() as held:
+        rig_asked = rig
         if against is not None:
             rig = held.enter_context(fitted_own(console, against, model, rig, pairs))
         task = prepared(model, fit, holdout, rig, without, answered(model))
-    kernel = task.model.physics.kernel
-    threads = (os.cpu_count() or 1) if kernel.compiled and not kernel.alone else 1
-    with progress_bar(console) as progress:
-        bar = progress.add_task("diagnosing", total=1.0)
-        options = Options(pairs=pairs, threads=threads, experiment=design_own)
-        found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
-    named = ("--rig-model", str(model), *(() if rig_asked is None else ("--rig", str(rig_asked))))
-    asked = Asked(tuple(fit), holdout, output, save_rig, named, program=program())
-    files, first = outputs.write_outputs(output, found, task.model, task.fit, task.holdout, asked)
-    if found.experiment is not None:
-        files += found.experiment.write(output)
-    if save_rig is not None:
-        files.append(outputs.save_rig(found, task.model, save_rig))
-    show(console, found, first)
-    for file in files:
-        console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
+        kernel = task.model.physics.kernel
+        threads = (os.cpu_count() or 1) if kernel.compiled and not kernel.alone else 1
+        with progress_bar(console) as progress:
+            bar = progress.add_task("diagnosing", total=1.0)
+            options = Options(pairs=pairs, threads=threads, experiment=design_own)
+            found = task.diagnose(options, lambda share, what: progress.update(bar, completed=share, description=what))
+        named = ("--rig-model", str(model), *(() if rig_asked is None else ("--rig", str(rig_asked))))
+        asked = Asked(tuple(fit), holdout, output, save_rig, named, program=program())
+        files, first = outputs.write_outputs(output, found, task.model, task.fit, task.holdout, asked)
+        if found.experiment is not None:
+            files += found.experiment.write(output)
+        if save_rig is not None:
+            files.append(outputs.save_rig(found, task.model, save_rig))
+        show(console, found, first)
+        for file in files:
+            console.print(f"written  {file}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _check_files(fit: Sequence[Path], holdout: Path | None, model: Path, rig: Path) -> None:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -26,6 +27,28 @@ def refuse_existing(files: Iterable[Path], overwrite: bool) -> None:
     there = [file for file in files if file.exists()]
     if there and not overwrite:
         raise InputError("exists already", where=there[0], remedy="choose another name, or say --overwrite")
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """The folder of a diagnosis: made and seen to be writable, and gone again if nothing came of it.
+
+    Raises
+    ------
+    InputError
+        if it cannot be written.
+    """
+    from pneumo_ros.diagnosis.report import claim_folder
+
+    made = not folder.exists()
+    claim_folder(folder)
+    try:
+        yield
+    except BaseException:
+        if made:
+            with suppress(OSError):
+                folder.rmdir()  # refuses where anything is inside
+        raise
 
 
 def refuse_old_diagnosis(folder: Path, save_rig: Path | None, overwrite: bool, inputs: Iterable[Path] = ()) -> None:

@@ -3,7 +3,12 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from types import FrameType
+
+COMPILER = "llvmlite.binding"  # calls back from compiled code
+LATER = 0.02  # s
 
 
 class Interrupted(KeyboardInterrupt):
@@ -16,11 +21,16 @@ class Interrupted(KeyboardInterrupt):
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Handler of a signal.
+    """Handler of a signal; while the compiler has called back, which drops what is raised there, it comes again.
 
     Raises
     ------
     Interrupted
-        always.
+        anywhere else.
     """
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).startswith(COMPILER):
+            threading.Timer(LATER, os.kill, (os.getpid(), number)).start()
+            return
+        frame = frame.f_back
     raise Interrupted

@@ -23,7 +23,7 @@ def _stopped(number: int = signal.SIGINT, frame: FrameType | None = None) -> Non
     os._exit(INTERRUPTED)
 
 
-if __name__ == "__main__" or sys.argv[0].endswith("pneumo"):
+if __name__ in ("__main__", "__mp_main__") or sys.argv[0].endswith("pneumo"):
     signal.signal(signal.SIGINT, _stopped)  # first of all: nothing has begun that would have to end in order
 
 from importlib import import_module

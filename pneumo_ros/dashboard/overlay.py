@@ -40,6 +40,7 @@ from pneumo_ros.printable import one_line
 CHANNELS = (*DISPLACEMENT.names, "front_pressure", "rear_pressure")
 PAIR = ("#1f77b4", "#d62728")
 POINTS = 4000  # a curve
+CHOICE = 150  # px, in which every channel's name keeps clear of the arrow
 SEGMENT = 1024  # samples of a spectrum's windows
 HEIGHT = 240  # px
 BENEATH = 3.0  # px; the first run shows on both sides of one that follows it
@@ -165,14 +166,15 @@ class Overlay:
 
     def _xy(self) -> Any:
         plot = self._figure("one channel over another")
-        across, up = (Select(title=axis, value=CHANNELS[k], options=list(CHANNELS), name=axis)
+        words = [channel.replace("_", " ") for channel in CHANNELS]
+        across, up = (Select(title=axis, value=words[k], options=words, name=axis, width=CHOICE)
                       for axis, k in (("x", 2), ("y", 0)))  # fmt: skip
         data = [ColumnDataSource({"x": [], "y": []}) for _ in self._series]
         lines = [(one.name, plot.line("x", "y", source=source, color=one.colour, name=one.name))
                  for one, source in zip(self._series, data, strict=True)]  # fmt: skip
 
         def show() -> None:
-            x, y = CHANNELS.index(across.value), CHANNELS.index(up.value)
+            x, y = words.index(across.value), words.index(up.value)
             plot.xaxis.axis_label, plot.yaxis.axis_label = f"{across.value}, {_unit(x)}", f"{up.value}, {_unit(y)}"
             for one, source in zip(self._series, data, strict=True):
                 every = max(1, len(one.time) // POINTS)

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every node of a session shares: declared parameters, topics from the table, readiness, health."""
+"""What every node of a session shares: declared parameters, readiness, its end, health."""
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, TextIO
+from typing import TextIO
 
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -18,29 +19,19 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.context import Context
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import Executor
-from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from std_msgs.msg import String
 
 from pneumo_ros.daq.priority import prefer_this_process
 from pneumo_ros.errors import InputError
-from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP, Topic
+from pneumo_ros.log.topics import DIAGNOSTIC, EVENTS, SETUP
 from pneumo_ros.nodes.delivery import DELIVERY_PATIENCE, delivered
 from pneumo_ros.nodes.hand_over import HandOver
-from pneumo_ros.nodes.interfaces import message_class
-from pneumo_ros.nodes.parcels import Parcels
-from pneumo_ros.nodes.qos import overriding, publisher_qos, refused_overrides, subscriber_qos
 from pneumo_ros.nodes.readiness import Readiness
-from pneumo_ros.nodes.sources import NAMING, SoleSource
+from pneumo_ros.nodes.wired import WiredNode
 from pneumo_ros.parameters import Parameter, Value
 from pneumo_ros.session.supervisor import SUPERVISOR, noted_failure
 from pneumo_ros.session.timing import LoopTiming
@@ -87,7 +78,7 @@ class StopRequest:
         self.reason = ""
 
 
-class RigNode(Node):
+class RigNode(WiredNode):
     """A node of the session.
 
     Parameters
@@ -98,13 +89,7 @@ class RigNode(Node):
     overrides : parameter values that win over files and arguments
     owns_time : whether samples get their time here: such a node cannot follow /clock, whatever use_sim_time says
     hand_over : of the nodes of one process; used in lockstep, where every message counts
-
-    Attributes
-    ----------
-    takes_at_once : whether what is handed over to it is only kept, in no time
     """
-
-    takes_at_once = False
 
     def __init__(
         self,
@@ -124,20 +109,15 @@ class RigNode(Node):
         )
         self.role, self.owns_time = name, owns_time
         self.table = {p.name: p for p in (*COMMON, *table)}
-        self.values: dict[str, Any] = {p.name: self._declare(p) for p in self.table.values()}
-        self.lockstep = self.values["mode"] == "lockstep"
-        self.hand_over = hand_over if self.lockstep else None
+        self.values = {p.name: self._declare(p) for p in self.table.values()}
         if "daq" in str(self.values["session_nodes"]).split(",") and name != "session_recorder":
             prefer_this_process()  # hardware does not wait for other programs; the recorder may
         self.period_ns = round(1e9 / self.values["rate_hz"])
         self.stop = StopRequest()
         self.exit_code = 0
         self.timing = LoopTiming()
-        self.sources: list[SoleSource] = []
-        self._outgoing: list[tuple[Topic, Publisher]] = []
         self._logged: dict[str, float] = {}
-        apart = self.lockstep and self.hand_over is None and self.values["session_id"]
-        self.parcels = Parcels(self) if apart else None
+        self.wire(hand_over, self._refuse_publisher)
         self._events = self.publisher(EVENTS)
         self._setup = self.publisher(SETUP)
         self._diagnostics = self.publisher(DIAGNOSTIC)
@@ -147,6 +127,10 @@ class RigNode(Node):
         self.steady_timer(DIAGNOSTIC_PERIOD, self._publish_diagnostics)
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._note_change)
+        if not self.lockstep:
+            # rclpy asks inspect for the place of each line of log; the first time it looks at every module there is,
+            # 20 to 90 ms in which a node would neither sample nor command.
+            inspect.getframeinfo(sys._getframe())
 
     # -- parameters ------------------------------------------------------------------------------------------------
 
@@ -191,78 +175,7 @@ class RigNode(Node):
         text = yaml.safe_dump({"node": self.role, "time_ns": stamp, "parameters": self.values}, sort_keys=False)
         self._setup.publish(String(data=text))
 
-    # -- topics ----------------------------------------------------------------------------------------------------
-
-    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
-        """As rclpy's; the quality of service can be overridden by parameters."""
-        if not hasattr(self, "lockstep"):  # rclpy's own, while the node is being made
-            return super().create_publisher(*args, **options)
-        options.setdefault("qos_overriding_options", overriding(self.lockstep))
-        with refused_overrides(self.get_name(), self.resolve_topic_name(args[1])):
-            return super().create_publisher(*args, **options)
-
-    def create_subscription(self, *args: Any, **options: Any) -> Subscription:
-        """As rclpy's; the quality of service can be overridden by parameters."""
-        if not hasattr(self, "lockstep"):
-            return super().create_subscription(*args, **options)
-        options.setdefault("qos_overriding_options", overriding(self.lockstep))
-        with refused_overrides(self.get_name(), self.resolve_topic_name(args[1])):
-            return super().create_subscription(*args, **options)
-
-    def steady_timer(self, period: float, callback: Callable[[], None]) -> Timer:
-        """A timer on a steady clock: simulated time may stand still, waiting and watching must not."""
-        return self.create_timer(period, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    def sender(self, topic: Topic) -> Callable[[bytes], None]:
-        """Create the publisher of a topic of the table; what sends serialised bytes with it, or in a shorter way."""
-        for shorter in (self.hand_over, self.parcels):
-            if shorter is not None and shorter.covers(topic):
-                outlet = shorter.outlet(topic)
-                outlet.attach(self.publisher(topic, event_callbacks=PublisherEventCallbacks(matched=outlet.on_matched)))
-                return outlet.publish
-        send: Callable[[bytes], None] = self.publisher(topic).handle.publish_raw
-        return send
-
-    def send_off(self) -> None:
-        """Everything is said that other nodes wait for: where it goes in a parcel, that leaves now."""
-        if self.parcels is not None:
-            self.parcels.send_off()
-
-    def publisher(self, topic: Topic, **options: Any) -> Publisher:
-        """Create the publisher of a topic of the table; ``options`` as of :meth:`create_publisher`."""
-        qos = publisher_qos(topic.flow, self.lockstep)
-        made = self.create_publisher(message_class(topic.type), topic.relative, qos, **options)
-        self._outgoing.append((topic, made))
-        return made
-
-    def subscribe(self, topic: Topic, callback: Callable[[bytes], None], qos: QoSProfile | None = None) -> SoleSource:
-        """Receive a topic of the table, or the parcels it comes in, from its one publisher, as serialised bytes."""
-        qos = qos or subscriber_qos(topic.flow, self.lockstep)
-        if self.parcels is not None and self.parcels.covers(topic):
-            return self.parcels.take(topic, callback, qos)
-        source = SoleSource(self, topic, self.on_other_publisher)
-        made = self.create_subscription(
-            message_class(topic.type), topic.relative, callback, qos,
-            event_callbacks=source.callbacks() if topic.publisher else None, raw=True,
-        )  # fmt: skip
-        source.attach(made)
-        self.sources.append(source)
-        if self.hand_over is not None and self.hand_over.covers(topic):
-            source.unheard()
-            self.hand_over.take(topic, callback, at_once=self.takes_at_once)
-        return source
-
-    def on_other_publisher(self, source: SoleSource, text: str) -> None:
-        """Somebody else publishes what this node takes from one publisher; nothing more of it is used."""
-        source.mute()
-        self._refuse_publisher(source.too_many(NAMING) if source.count > 1 else text)
-
-    def sole_publisher(self, topic: Topic) -> None:
-        """End the session if anybody else publishes a topic of this node's."""
-        source = SoleSource(self, topic, self.on_other_publisher)
-        source.count = len(source.publishers())
-        if source.count > 1:
-            self._refuse_publisher(source.too_many(NAMING))
+    # -- the session ---------------------------------------------------------------------------------------------------
 
     def _refuse_publisher(self, text: str) -> None:
         self.fail("other_publisher", f"{text}; end the other one, or run in another domain or namespace")
@@ -271,21 +184,6 @@ class RigNode(Node):
         # A session that runs goes on: the newcomer hears of it and ends. Its publishers are another matter.
         if not self.begun:
             self.fail("other_session", f"{text}; end it, or use --domain N or --isolate")
-
-    def expected_subscribers(self, topic: Topic) -> set[str]:
-        """Nodes of the session that take ``topic`` itself, not in parcels."""
-        return set() if self.parcels is not None and self.parcels.covers(topic) else self.takers(topic)
-
-    def takers(self, topic: Topic) -> set[str]:
-        """Other nodes of the session that act on what ``topic`` carries, or record it."""
-        takers = {*topic.subscribers, *(("session_recorder",) if topic.recorded else ())}
-        takers |= set() if self.lockstep else set(topic.in_real_time)
-        return takers & self.session_nodes - {self.role}
-
-    @property
-    def session_nodes(self) -> set[str]:
-        """Nodes of the session, as the table of topics calls them."""
-        return set(str(self.values["session_nodes"]).split(","))
 
     def _look_for_subscribers(self) -> None:
         if not self.ready:

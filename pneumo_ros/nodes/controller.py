@@ -75,11 +75,11 @@ class ControllerNode(StageNode[ControllerStage]):
             return  # the safe command has overtaken this sample; a command's stamp never goes back
         self._last_ns, self._last_stamp, self._stale = start, stamp, False
         output = self.advance(stamp, estimate)
-        if output.refused:
-            self._say_refused(stamp)
         self._said = stamp
         self._publish(self._command(stamp, output.values))
         self.send_off()
+        if output.refused:
+            self._say_refused(stamp)
         if self._steps % self.values["telemetry_every"] == 0:
             self._publish_sliding(self._sliding(stamp, output.telemetry))
         self._steps += 1
@@ -90,12 +90,12 @@ class ControllerNode(StageNode[ControllerStage]):
         age = time.monotonic_ns() - self._last_ns
         if not self._last_ns or age <= self._timeout_ns or self.stop.set:
             return
-        if not self._stale:
-            self._stale = True
-            self.event(WARN, "estimate_stale", f"no estimate for {age / 1e6:.1f} ms: safe command")
         # The time since the last sample, on its clock: neither simulated time nor a clock that was set matters.
         self._said = self._last_stamp + age
         self._publish(self._command(self._said, self._closed))
+        if not self._stale:  # told once the valves are asked to close, for telling takes its time
+            self._stale = True
+            self.event(WARN, "estimate_stale", f"no estimate for {age / 1e6:.1f} ms: safe command")
 
     def _say_refused(self, stamp: int) -> None:
         """Valves at trim instead of a command that is not finite; said once a second at most."""

@@ -62,13 +62,18 @@ def test_log_holds_what_was_simulated(tmp_path: Path) -> None:
     assert scene["added_mass"] > 0.0 or scene["supply_change"] < 0.0
 
 
-def test_half_made_case_is_made_again(tmp_path: Path) -> None:
+def test_a_half_made_case_is_made_again_and_a_whole_one_kept(tmp_path: Path) -> None:
     case = plan("ci")[0]
     (tmp_path / "cases" / f"{case.name}.part").mkdir(parents=True)
     (tmp_path / "cases" / f"{case.name}.part" / "fit.mcap.part").write_text("torn")
     done = made(case, tmp_path / "cases", tmp_path / "labels")
     assert sorted(p.name for p in done.iterdir()) == ["edit.mcap", "fit.mcap", "holdout.mcap"]
     assert json.loads((tmp_path / "labels" / f"{case.name}.json").read_text())["kind"] == "none"
+    for log in map(read_log, done.iterdir()):
+        assert log.config is not None and log.topics["/road/profile"].count == SAMPLES
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.*")}
+    assert made(case, tmp_path / "cases", tmp_path / "labels") == done
+    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.*")}
 
 
 def test_tolerances_are_those_of_the_rig_file() -> None:

@@ -53,6 +53,12 @@ def test_what_comes_next_runs_on_the_bench_that_the_log_is_of(tmp_path: Path) ->
     assert _bench(write(tmp_path / "foreign.mcap", contract_log(20))) == ()
 
 
+@pytest.fixture(scope="module")
+def short_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log that is long enough to be diagnosed."""
+    return write_log(tmp_path_factory.mktemp("log") / "fit.mcap", *simulated(3.0), [load_rig().to_yaml()])
+
+
 def damped_log(path: Path, seed: int, own_effect: Path, payload: float = 0.0) -> Path:
     """A log of the nominal rig that has the example's effect at both ends and, stated by its config, a payload, kg."""
     clean, road, commands = simulated(7.0, seed)
@@ -89,6 +95,38 @@ def test_an_effect_of_ones_own_wins_and_predicts_a_known_change(
     assert "edit test on heavier.mcap (sprung_mass +7.9 %)" in done.output.replace("\n", " ")
     assert "quadratic_damping" in (tmp_path / "rig.yaml").read_text()
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["diagnosis.json", "report.html", "residual.mcap"]
+
+
+TAKEN = r"allowed: id, summary, sites, places, parameters, .*; did you mean 'summary'\?"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "line", "words"),
+    [
+        ("low=0.0", "low=6000.0", 21, r"low 6000 is not below high 5000"),
+        ("{end}_force", "{end}_forze", 15, r"unknown place '{end}_forze'; allowed: {end}_force, {end}_air, "),
+        ("summary=", "sumary=", 15, rf"Effect has no such field, key 'sumary'; {TAKEN}"),
+        ("force(strut, z, p)", "force(strut, p)", 10, r"another form, key 'force', value '\(strut, p\)'; "
+         r"allowed: \(strut, z, p\)"),
+        ("@njit", "#", 11, r"an ordinary function, key 'force'; write @njit\(cache=True, error_model=\"numpy\"\)"),
+        pytest.param("p[0]", "q[0]", 10, r"cannot be compiled \(NameError: name 'q' is not defined\); mend the law; "
+                     r".*hooks\.py", marks=pytest.mark.slow),
+        pytest.param("* strut.rate", "* strut.rat", 12, r"Strut has no such field, key 'rat'; allowed: height, rate, "
+                     r"gauge, area, force, middle, middle_rate; did you mean 'rate'\?", marks=pytest.mark.slow),
+    ],
+    ids=["low above high", "place", "field", "arguments", "not compiled", "name", "signal"],
+)  # fmt: skip
+def test_a_mistake_in_an_effect_is_one_line_with_file_and_line(
+    tmp_path: Path, own_effect: Path, short_log: Path, right: str, wrong: str, line: int, words: str
+) -> None:
+    """What numba finds ended in 95 lines of traceback; whatever it was, an empty folder was left."""
+    file, folder = tmp_path / "mine.py", tmp_path / "report"
+    file.write_text(own_effect.read_text().replace(right, wrong, 1))
+    without = [word for name in load_library() for word in ("--without", name)]
+    told = [str(short_log), "--output", str(folder), "--effect", str(file), *without]
+    error = CliRunner().invoke(app, told).exception
+    assert isinstance(error, InputError) and re.fullmatch(rf"{re.escape(str(file))}:{line}: .*{words}.*", str(error))
+    assert not folder.exists()
 
 
 def test_an_installed_package_offers_effects(tmp_path: Path, own_effect: Path, monkeypatch: pytest.MonkeyPatch) -> None:

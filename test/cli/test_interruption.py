@@ -20,3 +20,40 @@ except KeyboardInterrupt:
 def test_a_caught_interruption_of_generated_code_does_not_kill_the_process_at_its_end() -> None:
     done = subprocess.run([sys.executable, "-c", CAUGHT], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
+
+
+DROPPED = """
+import ctypes, os, signal, time
+from pneumo_ros.cli.interruption import interrupt
+signal.signal(signal.SIGINT, interrupt)
+compiler = {"__name__": "llvmlite.binding.executionengine", "os": os, "signal": signal}
+exec("def notify():\\n    os.kill(os.getpid(), signal.SIGINT)\\n    for _ in range(1000): pass", compiler)
+try:
+    ctypes.CFUNCTYPE(None)(compiler["notify"])()
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("caught")
+"""
+
+
+def test_an_interruption_that_meets_a_callback_of_the_compiler_is_not_lost() -> None:
+    """ctypes drops what is raised there: a batch went on to its end, exit code 0."""
+    done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
+
+
+LOADED = """
+import sys, signal
+before = set(sys.modules)
+def first(number, handler):
+    print(*sorted(set(sys.modules) - before))
+    raise SystemExit
+signal.signal, sys.argv = first, ["pneumo"]
+import pneumo_ros.cli.main
+"""
+
+
+def test_nothing_is_loaded_before_ctrl_c_is_heeded() -> None:
+    """What is takes its time, in which Ctrl-C ends in a traceback: 30 ms for the package's version alone."""
+    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["pneumo_ros", "pneumo_ros.cli", "pneumo_ros.cli.main"], done.stderr

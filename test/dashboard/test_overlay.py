@@ -97,8 +97,9 @@ def test_the_page_has_what_comparing_needs(session: Path) -> None:
     assert [len(chooser.labels) for chooser in choosers] == [len(CHANNELS)] * 2
     across = root.select_one({"type": Select, "name": "x"})
     assert across is not None
-    across.value = "front_pressure"
-    assert any("front_pressure, kPa" in str(axis.axis_label) for axis in root.select({"name": None}) if
+    assert across.options[:2] == ["sprung front", "sprung rear"], "as the plots are called"
+    across.value = "front pressure"
+    assert any("front pressure, kPa" in str(axis.axis_label) for axis in root.select({"name": None}) if
                hasattr(axis, "axis_label"))  # fmt: skip
 
 

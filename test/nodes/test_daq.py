@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -211,8 +212,6 @@ def test_an_operator_walks_through_the_life_cycle(tmp_path: Path) -> None:
         for name, value in (("port", link), ("mode", "realtime"), ("autostart", "false"),
                             ("calibration", CALIBRATION), ("session_nodes", "daq")):  # fmt: skip
             command += ["-p", f"{name}:={value}"]
-        import os
-
         node = subprocess.Popen(command, env={**os.environ, "ROS_DOMAIN_ID": str(domain)})
         operator = Operator(domain)
         try:
@@ -275,6 +274,41 @@ def test_the_controller_sends_the_safe_command_when_estimates_stop() -> None:
         closed = [when for when, areas in commands if when > last and areas == [0.0] * 4]
         assert before and max(before[-1]) > 0.0
         assert len(closed) > 10 and closed[0] - last < 0.05 + (closed[1] - closed[0])
+
+
+def test_the_valves_are_asked_to_close_before_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first line of a log took rclpy 45 ms, and the safe command waited for it."""
+    told: list[str] = []
+    with sessions.own_context() as context:
+        node = ControllerNode(context, {"mode": "realtime", "session_nodes": "controller"})
+        monkeypatch.setattr(node, "event", lambda level, code, message: told.append(code))
+        monkeypatch.setattr(node, "_publish", lambda data: told.append("command"))
+        node._last_ns = 1
+        node._watch()
+        node._watch()
+    assert told == ["command", "estimate_stale", "command"]
+
+
+FIRST_LINE = """
+import time
+import rclpy
+from pneumo_ros.nodes.base import OK
+from pneumo_ros.nodes.controller import ControllerNode
+rclpy.init()
+node = ControllerNode(overrides={"mode": "realtime", "session_nodes": "controller"})
+start = time.thread_time()
+node.event(OK, "first", "the first line of this process")
+print(time.thread_time() - start)
+"""
+
+
+def test_the_first_line_of_a_real_time_node_does_not_stall_it() -> None:
+    """CPU time, so that no other program matters: 1 ms, and 20 to 90 ms if rclpy first looks at every module."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(sessions.own_domain())}
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_LINE], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert float(done.stdout) < 0.01, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

@@ -23,13 +23,14 @@ from pneumo_ros.log.reading import read_log
 DURATION = 3.0
 SAMPLES = 1501
 PERIOD_NS = 2_000_000
+ONE_CHUNK = 100_000  # bytes that a log exceeds once a chunk of it is on the disk: 200 kB, a second of driving
 LOG_ALONE = ("--no-summary", "--no-picture", "--no-report")  # of sessions that are looked at for how they end
 
 
 @pytest.fixture(scope="module")
 def processes_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("processes") / "session.mcap"
-    code, said = sessions.run("--duration", str(DURATION), "--seed", "5", "--output", str(path))
+    code, said = sessions.run("--duration", str(DURATION), "--seed", "5", "--output", str(path), *LOG_ALONE[1:])
     assert code == 0, said
     assert "heave accel." in said
     return path
@@ -99,7 +100,7 @@ def test_same_seed_gives_equal_bytes_whatever_the_processes(processes_log: Path,
 def test_killing_a_node_leaves_a_readable_log(tmp_path: Path, victim: str) -> None:
     path = tmp_path / "session.mcap"
     process = sessions.start("--duration", "0", "--output", str(path), *LOG_ALONE)
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     sessions.kill(sessions.children(process.pid)[victim])
     said, _ = process.communicate(timeout=60)
     assert process.returncode != 0
@@ -115,7 +116,7 @@ def test_killing_the_recorder_leaves_a_readable_log_that_says_so(tmp_path: Path)
     path = tmp_path / "session.mcap"
     process = sessions.start("--duration", "0", "--output", str(path), *LOG_ALONE)
     part = path.with_name("session.mcap.part")
-    sessions.wait_for(process, part, 600_000)
+    sessions.wait_for(process, part, ONE_CHUNK)
     sessions.kill(sessions.children(process.pid)["session_recorder"])
     said, _ = process.communicate(timeout=60)
     assert process.returncode != 0 and "session_recorder" in said
@@ -126,22 +127,11 @@ def test_killing_the_recorder_leaves_a_readable_log_that_says_so(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_interrupt_finishes_the_log(tmp_path: Path) -> None:
-    path = tmp_path / "session.mcap"
-    process = sessions.start("--duration", "0", "--output", str(path), *LOG_ALONE)
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
-    process.send_signal(2)
-    said, _ = process.communicate(timeout=60)
-    assert process.returncode == 0, said
-    assert read_log(path).topics["/rig/displacement"].count > 100
-
-
-@pytest.mark.slow
 def test_an_impatient_user_ends_it_as_well_as_a_patient_one(tmp_path: Path) -> None:
     """Ctrl-C a hundred times a second, from the first to the last moment: one of them meets every stage of the end."""
     path = tmp_path / "session.mcap"
     process = sessions.start("--duration", "0", "--output", str(path))
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     end = time.monotonic() + 60.0
     while process.poll() is None and time.monotonic() < end:
         process.send_signal(signal.SIGINT)
@@ -153,15 +143,14 @@ def test_an_impatient_user_ends_it_as_well_as_a_patient_one(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("duration", "code", "words"), [("0", 0, "ended node plant"), ("60", 1, "cut short after")])
-def test_a_rig_that_somebody_stops_is_told(tmp_path: Path, duration: str, code: int, words: str) -> None:
-    """The node that is the rig ends the session when it is asked to: a timed one is not what was wanted."""
+def test_a_rig_that_somebody_stops_is_told(tmp_path: Path) -> None:
+    """The node that is the rig ends the session when it is asked to; a timed one is cut short, see below."""
     path = tmp_path / "session.mcap"
-    process = sessions.start("--duration", duration, "--output", str(path), *LOG_ALONE)
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    process = sessions.start("--duration", "0", "--output", str(path), *LOG_ALONE)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     os.kill(sessions.children(process.pid)["plant"], signal.SIGINT)
     said, _ = process.communicate(timeout=60)
-    assert process.returncode == code and words in " ".join(said.split()), said
+    assert process.returncode == 0 and "ended node plant" in " ".join(said.split()), said
     assert read_log(path).topics["/rig/displacement"].count > 100
 
 
@@ -169,7 +158,7 @@ def test_a_rig_that_somebody_stops_is_told(tmp_path: Path, duration: str, code: 
 def test_a_session_that_was_cut_short_stays_so_without_its_report(tmp_path: Path) -> None:
     path = tmp_path / "session.mcap"
     process = sessions.start("--duration", "60", "--output", str(path))
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 300_000)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     os.kill(sessions.children(process.pid)["plant"], signal.SIGINT)
     assert process.stdout is not None
     said = next(line for line in process.stdout if "cut short" in line)
@@ -178,6 +167,8 @@ def test_a_session_that_was_cut_short_stays_so_without_its_report(tmp_path: Path
         time.sleep(0.01)
     said += process.stdout.read()
     assert process.returncode == 1 and "no report was made" in said and "Traceback" not in said, said
+    assert "cut short after" in " ".join(said.split()), said
+    assert read_log(path).topics["/rig/displacement"].count > 100
 
 
 @pytest.mark.slow
@@ -185,7 +176,7 @@ def test_nodes_and_dashboard_end_when_their_supervisor_is_killed(tmp_path: Path)
     pytest.importorskip("bokeh")
     path = tmp_path / "session.mcap"
     process = sessions.start("--duration", "0", "--output", str(path), *LOG_ALONE, "--view")
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 200_000)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     started = sessions.children(process.pid)
     assert len(started) == 6 and "view" in started
     sessions.kill(process.pid)
@@ -204,7 +195,7 @@ def test_real_time_session_keeps_the_clock_and_takes_live_gains(tmp_path: Path) 
     path = tmp_path / "session.mcap"
     domain = sessions.own_domain()
     process = sessions.start("--realtime", "--duration", "6", "--output", str(path), *LOG_ALONE, domain=domain)
-    sessions.wait_for(process, path.with_name("session.mcap.part"), 100_000)
+    sessions.wait_for(process, path.with_name("session.mcap.part"), ONE_CHUNK)
     with sessions.parameters_of(domain, "controller") as ask:
         assert ask("pole", 14.0) == ""
         assert "out of range" in ask("pole", 1e9)
