@@ -34,7 +34,7 @@ SLOW = (0.05, 0.2)  # m/s, rates of the strut below which the exponent is lower
 MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
 SETTLES = (3.0, 12.0)  # s after a session's begin in which an orifice changes, as by ice
 
-ATOMS = (
+ATOMS: tuple[Atom | EffectParameter, ...] = (
     Atom("leak hole", "m2", 2e-7),
     Atom("leak gap", "m2", 2e-7),
     Atom("leak that opens", "m2", 1e-7),
