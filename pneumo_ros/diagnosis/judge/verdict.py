@@ -49,7 +49,7 @@ class Calibration:
         that the structure must leave to be as likely something else: it moves the run by forces and flows that the rig
         does not have; of an effect whose own equations show a gap no more than there, for others may miss the most
     unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
-        likely something else
+        likely something else, unless it holds as much of the run (mean square) as is left there in all
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
@@ -202,17 +202,17 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
+    held_in_run = one.own / max(one.without - one.own, 1e-12)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
                min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,
-               max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0])]  # fmt: skip
+               min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), held_in_run)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
     # the run or, where that is led astray by what is left, in the rig's equations.
     if one.places[0].startswith(SENSOR):
-        held_alone = min(one.own / max(one.without - one.own, 1e-12), 1.0 / max(one.held_up, 1e-9))
-        against += [held_alone, 1.0 / max(one.follows, 1e-9)]
+        against += [min(held_in_run, 1.0 / max(one.held_up, 1e-9)), 1.0 / max(one.follows, 1e-9)]
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 

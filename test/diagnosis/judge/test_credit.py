@@ -42,7 +42,12 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
         "the equations miss what they did": (SURE, replace(FAR, kept=k * c.kept)),
         "its own miss what they did": (replace(SURE, mended=k * c.kept), replace(FAR, kept=10.0)),
         "they miss nothing without it": (
-            replace(SURE, missing=(1.0 + 1e6 * (c.unheld[0] + k * (c.unheld[1] - c.unheld[0])), 1.0 + 1e6)),
+            replace(
+                SURE,
+                missing=(1.0 + 1e6 * (c.unheld[0] + k * (c.unheld[1] - c.unheld[0])), 1.0 + 1e6),
+                own=0.6,
+                ceiling=0.6,
+            ),
             FAR,
         ),
         "a reading that stops": (replace(SURE, places=("sensor:front_pressure",), follows=1.0 / k), FAR),
@@ -63,6 +68,15 @@ def test_what_the_equations_miss_is_named_beside_what_nobody_can_predict(without
     """It closes 6 % of the run's gap; the equations miss 4 null variances with it and so many without."""
     one = replace(SURE, missing=(4.0, without))
     assert (credit(one, HeldOutGaps(100.0, 94.0), CONSTANTS) > 0.5) is named
+
+
+@pytest.mark.parametrize("own, named", [(0.2, True), (0.45, True), (0.6, False)])
+def test_what_holds_more_of_the_run_than_is_left_stands_where_the_equations_see_something_else(
+    own: float, named: bool
+) -> None:
+    """A stop beside a sensor whose error fills them; ``own`` of what is left without it is left with it."""
+    one = replace(SURE, missing=(15.0, 11.0), own=own, ceiling=own)
+    assert (credit(one, FAR, CONSTANTS) > 0.5) is named
 
 
 def test_what_others_miss_is_no_reason_against_what_has_mended_its_own_equations() -> None:
