@@ -83,8 +83,8 @@ class ActsElsewhere(Protocol):
         """Whether its name is held against those places however little the structure leaves."""
 
     def elsewhere_of(self, site: str) -> tuple[tuple[str, ...], ...]:
-        """Sets of those places, for what acts at one site; each set could make its motion; two joined by "-"
-        are what ties them together."""
+        """Sets of those places, for what acts at one site; each set could make its motion; one with "-" is
+        what ties two together, or another thing at one."""
 
 
 @runtime_checkable

@@ -88,8 +88,8 @@ class Effect:
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
     elsewhere : places, ``{end}`` as above, where the same motion may come from: its name is held against what may act
-        there in its stead (two joined by "-": what ties them together); always where its motion tells nothing of the
-        place (``always``), else where the structure leaves much
+        there in its stead (with "-": what ties two, or another thing at one); always where its motion tells nothing of
+        the place (``always``), else where the structure leaves much
     follows : of a sensor's error, the least share of what is there that a reading of the kind still follows at either
         end of its range, 0 where it may stop
     """

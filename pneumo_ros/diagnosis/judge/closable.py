@@ -37,7 +37,8 @@ ENOUGH: Final = 20  # samples that have a slope [numerics]
 TRACE: Final = 0.05  # of the floor's mean square: a structure that leaves less leaves nothing [taste]
 # Share (rms) of the refit's gap, both above the floor, from which on a structure leaves much [taste]
 LEFT: Final = 0.08
-TIED: Final = "-"  # joins two places to the name of what ties them together [definition]
+# In the name of what ties two places together, or is another thing at one than what is held against it [definition]
+TIED: Final = "-"
 TOGETHER: Final = 3  # places at which a remainder is looked for together [taste]
 
 
@@ -306,7 +307,8 @@ def _instead(
     bare = _fitted(problem, reduced(problem, best, gone, STEPS, _all(problem)))
     found = with_parts(problem, bare, parts, INSTEAD, _all(problem)) if parts else bare
     total = held_by(problem, found, holdout).total
-    places = tuple(dict.fromkeys(place for one in where for place in one.split(TIED)))
+    own = (place for part in parts for place in problem.model.places(Active(*part, ())))
+    places = tuple(dict.fromkeys(own)) if any(TIED in one for one in where) else where
     return Remainder(places, parts, found, _above(total, floor), total)
 
 

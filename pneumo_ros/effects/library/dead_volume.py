@@ -18,7 +18,7 @@ EFFECT = Effect(
     summary="volume of hose and fittings beside the spring's own",
     sites=ENDS,
     places=("{end}_air",),
-    elsewhere=("front_air-rear_air",),
+    elsewhere=("front_air-rear_air", "{end}_air-later"),
     parameters=(
         EffectParameter(
             "dead_volume",

@@ -47,7 +47,7 @@ EFFECT = Effect(
     summary="the air exchanges heat with the bellows' wall, so that slow strokes are nearly isothermal",
     sites=ENDS,
     places=("{end}_air",),
-    elsewhere=("front_air-rear_air",),
+    elsewhere=("front_air-rear_air", "{end}_air-later"),
     parameters=(
         EffectParameter(
             "wall_conductance",

@@ -44,7 +44,7 @@ EFFECT = Effect(
     summary="the spring or its fittings leak to the atmosphere",
     sites=ENDS,
     places=("{end}_air",),
-    elsewhere=("front_air-rear_air",),
+    elsewhere=("front_air-rear_air", "{end}_air-later"),
     parameters=(
         EffectParameter(
             "leak_area", "m2", 0.0, 5e-6, 2e-7, size=True, meaning="area of the hole with the same flow at 3 bar"

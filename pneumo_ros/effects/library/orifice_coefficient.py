@@ -38,7 +38,7 @@ EFFECT = Effect(
     summary="discharge coefficient of inlet and outlet off by a factor",
     sites=ENDS,
     places=("{end}_air",),
-    elsewhere=("front_air-rear_air",),
+    elsewhere=("front_air-rear_air", "{end}_air-later"),
     parameters=(
         EffectParameter(
             "coefficient_error",

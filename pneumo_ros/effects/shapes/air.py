@@ -116,4 +116,5 @@ EFFECTS = (
     ),
     AIR.shape("dead_volume", ["volume"], "a volume that is not V(h), of any law"),
     AIR.anything(),
+    AIR.anything("later", ["later"]),
 )

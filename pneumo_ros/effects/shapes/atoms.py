@@ -56,14 +56,18 @@ class Term:
         """The shape of a family: its atoms by name, or by the first word of their names; those that begin with
         ``alone`` are tried alone as well.
         """
-        columns = tuple(k for k, atom in enumerate(self.atoms) if atom.name in names or atom.name.split()[0] in names)
+        columns = self._columns(names)
         screened = tuple(n for n, k in enumerate(columns) if alone and self.atoms[k].name.startswith(alone))
         return replace(self._effect(f"{family}.shape", columns, summary, every_sign=False), screened=screened)
 
-    def anything(self) -> Effect:
-        """Every atom with either sign."""
-        columns = tuple(k for k, atom in enumerate(self.atoms) if isinstance(atom, Atom))
-        return self._effect(f"anything.{self.name}", columns, "whatever acts there", every_sign=True)
+    def anything(self, name: str = "", names: Sequence[str] = ()) -> Effect:
+        """Every atom with either sign; with a ``name`` of its own, those of ``names`` as in :meth:`shape`."""
+        columns = self._columns(names) if names else range(len(self.atoms))
+        kept = tuple(k for k in columns if isinstance(self.atoms[k], Atom))
+        return self._effect(f"anything.{name or self.name}", kept, "whatever acts there", every_sign=True)
+
+    def _columns(self, names: Sequence[str]) -> tuple[int, ...]:
+        return tuple(k for k, atom in enumerate(self.atoms) if atom.name in names or atom.name.split()[0] in names)
 
     def _effect(self, name: str, columns: tuple[int, ...], summary: str, every_sign: bool) -> Effect:
         parameters = tuple(amplitude(self.atoms[k], every_sign) for k in columns)

@@ -9,7 +9,8 @@ from pneumo_ros.effects.shapes import air, body, force, mode, outside, signals, 
 SHAPES: dict[str, Effect] = {
     effect.id: effect for room in (body, force, mode, air, tyre, supply, signals, outside) for effect in room.EFFECTS
 }
-# Kind of place (its end as the site), place of the whole rig, or two that are tied together -> what may act there.
+# Kind of place (its end as the site), place of the whole rig, two that are tied together, or what may be another thing
+# at one place than the names it is held against -> what may act there.
 ANYTHING: dict[str, tuple[str, ...]] = {
     "force": ("anything.force",),
     "air": ("anything.air", "anything.valve"),
@@ -19,6 +20,7 @@ ANYTHING: dict[str, tuple[str, ...]] = {
     "body_pitch": ("anything.body", "anything.bar"),
     "road_input": ("anything.ground",),
     "front_air-rear_air": ("anything.pipe",),
+    "air-later": ("anything.later",),
 }
 
 

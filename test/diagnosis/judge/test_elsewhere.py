@@ -108,6 +108,16 @@ def test_air_between_the_springs_is_no_loss_of_either(model: RigModel, name: str
 
 
 @pytest.mark.slow
+def test_an_outlet_that_ices_is_no_leak_with_heat(model: RigModel) -> None:
+    names = ("leak", "rear"), ("heat_transfer", "rear")
+    start = tuple(p.typical for name, _ in names for p in model.effects[name].parameters)
+    found = called(model, Active("anything.air", "rear", icing(model, -0.05)), names, start)
+    rest = found.remainders[0]
+    assert rest.places == ("rear_air",) and rest.parts == (("anything.later", "rear"),)
+    assert [likely(found, one) < 0.05 for one in found.effects] == [True, True]
+
+
+@pytest.mark.slow
 def test_a_leak_keeps_its_name_beside_air_between_the_springs(model: RigModel) -> None:
     name = ("leak", "both")
     assert likely(called(model, Active(*name, (3e-7, 0.5)), (name,), (2e-7, 0.6))) > 0.9
