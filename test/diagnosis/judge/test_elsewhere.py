@@ -114,7 +114,7 @@ def test_an_outlet_that_ices_is_no_leak_with_heat(model: RigModel) -> None:
     found = called(model, Active("anything.air", "rear", icing(model, -0.05)), names, start)
     rest = found.remainders[0]
     assert rest.places == ("rear_air",) and rest.parts == (("anything.later", "rear"),)
-    assert [likely(found, one) < 0.05 for one in found.effects] == [True, True]
+    assert [likely(found, one) < 0.1 for one in found.effects] == [True, True]
 
 
 @pytest.mark.slow
