@@ -30,12 +30,12 @@ def on_both(middle: float, rate: float, z: tuple[float, float], p: mode.Values) 
 
 
 def test_at_rest_each_plate_carries_half_of_the_weight() -> None:
-    assert on_both(0.1, 0.0, (0.1, 0.0), (0.3, 12.0, 0.05, 4.0, 0.5, 0.0, 0.0)) == pytest.approx((-2.0, -2.0))
+    assert on_both(0.1, 0.0, (0.1, 0.0), (0.3, 12.0, 0.05, 4.0, 0.5, 1.0, 0.0)) == pytest.approx((-2.0, -2.0))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_what_the_plates_feel_is_the_momentum_that_the_part_loses_but_for_the_grounds(share: float) -> None:
-    p = (0.3, 12.0, 0.05, 0.0, share, 0.0, 0.0)
+    p = (0.3, 12.0, 0.05, 0.0, share, 1.0, 0.0)
     tyre = Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0)
     shaken = 2.0 * math.pi * 4.0  # rad/s
     before, impulse = 0.01 * shaken, 0.0
@@ -55,7 +55,7 @@ def test_what_the_plates_feel_is_the_momentum_that_the_part_loses_but_for_the_gr
 def test_inside_the_strut_and_on_a_constant_spring_it_is_the_librarys_law() -> None:
     log, model = signals_of(*simulated(seconds=3.0)), RigModel(load_rig())
     law = Active("bellows_mode", "front", (0.3, 9.0, 0.06, 0.4))
-    shape = Active("bellows_mode.shape", "front", (0.3, 9.0, 0.06, 0.0, 0.4, 1.0, 0.0))
+    shape = Active("bellows_mode.shape", "front", (0.3, 9.0, 0.06, 0.0, 0.4, 0.0, 0.0))
     bare, one, other = (model.simulate(log, active=active) for active in ((), (law,), (shape,)))
     moved = np.abs(one - bare).max(axis=0)
     assert np.all(moved[:4] > 1e-5) and np.all(np.abs(one - other).max(axis=0) < 1e-6 * moved)
@@ -64,7 +64,7 @@ def test_inside_the_strut_and_on_a_constant_spring_it_is_the_librarys_law() -> N
 @pytest.mark.parametrize("size, stiffening", [(1e-3, 1e5), (2e-3, 5e4)])
 def test_a_spring_that_stiffens_rings_faster_the_farther_it_swings(size: float, stiffening: float) -> None:
     """Duffing: w^2 (1 + 3/4 s a^2) for a swing of a, to the first order."""
-    p = (0.3, 10.0, 1e-9, 0.0, 0.0, 1.0, stiffening)
+    p = (0.3, 10.0, 1e-9, 0.0, 0.0, 0.0, stiffening)
     strut, tyre = Strut(0.045, 0.0, 2e5, 5e-3, 1e3, 0.0, 0.0), Tyre(0.0, 0.0, 0.0, 0.0, 0.0, 0.02, 300.0, 0.0, 0.0)
     z, crossings = (0.045 + size, 0.0), []
     for i in range(20000):
@@ -85,8 +85,8 @@ def test_what_hangs_between_ground_and_strut_does_no_work_of_its_own() -> None:
     body = mode.force(strut, z, p)
     on_axle = mode.tyre(tyre, z, p) - body
     up, down = 2e-3, -1e-3  # m, of body and axle
-    along = p[5] * (up - down) + (1.0 - p[5]) * 0.5 * (up + down)
-    at = p[5] * (top - axle) + (1.0 - p[5]) * 0.5 * (top + axle) - z[0]
+    along = (1.0 - p[5]) * (up - down) + p[5] * 0.5 * (up + down)
+    at = (1.0 - p[5]) * (top - axle) + p[5] * 0.5 * (top + axle) - z[0]
     w = 2.0 * math.pi * p[1]
     pull = p[0] * (w * w * at * (1.0 + p[6] * at * at) - 2.0 * p[2] * w * (1.0 - p[4]) * z[1])
     assert body * up + on_axle * down == pytest.approx(-pull * along)

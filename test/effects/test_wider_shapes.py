@@ -190,13 +190,13 @@ def test_a_lip_that_opens_above_a_pressure_is_a_leak_wherever_the_spring_rests(e
     def flows(opens: float) -> np.ndarray:
         z = (rest * signals[0].volume, *[signals[0].temperature] * 3, 0.0, 0.0, rest)
         out = []
-        for column in SHAPES["leak.shape"].columns[:3]:
+        for column in (0, 1, *SHAPES["leak.shape"].columns[:1]):  # the law's hole and gap, and the shape's
             p = [0.0] * len(airs.ATOMS)
             p[column], p[3] = 1.0, opens
             out.append([airs.air(s, z, tuple(p)) * s.volume / (s.exponent * s.temperature) for s in signals])
         return np.array(out).T
 
     nothing = np.zeros((len(law), 1))
-    signed = signs(SHAPES["leak.shape"])[:3]
+    signed = [False, False, signs(SHAPES["leak.shape"])[0]]
     assert left_of(flows(0.0)[:, :2], signed[:2], law, nothing) > 0.25, "no hole and no gap opens"
     assert left_of(flows(margin), signed, law, nothing) < 0.06  # a hole that opens lets pass the more, the higher it is

@@ -106,7 +106,8 @@ def air(air: Air, z: State, p: Values) -> float:
 
 AIR = Term("air", PlantTerm(states=7, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
-    AIR.shape("leak", ["leak", "opens"], "a leak of any law: grows with the pressure", alone=("leak that opens",)),
+    # Holes and gaps are the law's; an area that the two share is no size to tell.
+    AIR.shape("leak", ["leak that opens", "opens"], "a leak that opens", alone=("leak that opens",)),
     AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),
     AIR.shape(
         "heat_transfer",

@@ -97,7 +97,7 @@ def test_a_law_beside_an_atom_that_is_the_same_does_not_spoil_the_screening(mode
 
 def test_a_shape_that_is_not_linear_starts_where_it_promises_most(model: RigModel) -> None:
     """A fold that swings against the ground at 11 Hz, beside a law that has ended at 5 Hz."""
-    truth = Active("bellows_mode.shape", "both", (0.4, 11.0, 0.06, 0.0, 0.5))
+    truth = Active("bellows_mode.shape", "both", (0.4, 11.0, 0.06, 0.0, 0.5, 1.0, 0.0))
     problem = Problem(model, (log(model, 1, None, (truth,)),))
     law = Candidate((("bellows_mode", "both"),))
     alone = fit(problem, law, problem.start(law, None, (0.2, 5.0, 0.2, 0.5)), iterations=6)
@@ -273,5 +273,5 @@ def test_natural_ends_of_a_law_are_no_bounds(
 def test_what_bends_a_shape_is_counted_by_itself_and_a_law_beside_it_half(model: RigModel) -> None:
     parts = (("bellows_mode", "front"), ("bellows_mode.shape", "front"))
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
-    x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0, 0.5))
+    x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0, 0.5, 0.5, 2e4))
     assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (0.5, 1.0)
