@@ -14,9 +14,11 @@ from helpers.rig_logs import noisy, simulated, write_log
 from helpers.small_logs import STRING, T0, contract_log, text, write
 from typer.testing import CliRunner
 
+from pneumo_ros.cli import own_laws
 from pneumo_ros.cli.diagnose import _bench, app
 from pneumo_ros.diagnosis.half_car.from_logs import prepared
 from pneumo_ros.diagnosis.half_car.signals import read_signals
+from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -174,3 +176,11 @@ def test_a_log_given_twice_is_refused(tmp_path: Path) -> None:
     logs = [write_log(tmp_path / name, *simulated(4.0), [load_rig().to_yaml()]) for name in ("a.mcap", "b.mcap")]
     with pytest.raises(InputError, match=r"a\.mcap, b\.mcap: the same log is given twice"):
         prepared(logs)
+
+
+def test_the_form_of_every_function_of_a_law_is_known() -> None:
+    """One that is not would end in a traceback where its mistake should be told; arguments as PlantTerm states them."""
+    hooks = {name for name, given in PlantTerm.__dataclass_fields__.items() if given.default is None}
+    assert set(own_laws.TAKEN) == hooks
+    stated = dict(re.findall(r"^ +(\w+) : \(([\w, ]+)\) ->", PlantTerm.__doc__ or "", re.MULTILINE))
+    assert stated == own_laws.TAKEN

@@ -6,6 +6,13 @@ from __future__ import annotations
 import subprocess
 import sys
 
+
+def ended(program: str) -> tuple[int, str, str]:
+    """Exit code, output and errors of a Python program."""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    return done.returncode, done.stdout, done.stderr
+
+
 CAUGHT = """
 import os, signal
 from pneumo_ros.cli.interruption import interrupt
@@ -18,8 +25,7 @@ except KeyboardInterrupt:
 
 
 def test_a_caught_interruption_of_generated_code_does_not_kill_the_process_at_its_end() -> None:
-    done = subprocess.run([sys.executable, "-c", CAUGHT], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
+    assert ended(CAUGHT) == (0, "caught\n", "")
 
 
 DROPPED = """
@@ -38,8 +44,7 @@ except KeyboardInterrupt:
 
 def test_an_interruption_that_meets_a_callback_of_the_compiler_is_not_lost() -> None:
     """ctypes drops what is raised there: a batch went on to its end, exit code 0."""
-    done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "caught\n", "")
+    assert ended(DROPPED) == (0, "caught\n", "")
 
 
 LOADED = """
@@ -55,5 +60,5 @@ import pneumo_ros.cli.main
 
 def test_nothing_is_loaded_before_ctrl_c_is_heeded() -> None:
     """What is takes its time, in which Ctrl-C ends in a traceback: 30 ms for the package's version alone."""
-    done = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, timeout=60)
-    assert done.stdout.split() == ["pneumo_ros", "pneumo_ros.cli", "pneumo_ros.cli.main"], done.stderr
+    _, loaded, errors = ended(LOADED)
+    assert loaded.split() == ["pneumo_ros", "pneumo_ros.cli", "pneumo_ros.cli.main"], errors

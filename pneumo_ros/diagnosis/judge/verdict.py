@@ -202,17 +202,17 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     c = calibration
     closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
-    held_in_run = one.own / max(one.without - one.own, 1e-12)
+    left_over_held = one.own / max(one.without - one.own, 1e-12)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.least / max(one.share, 1e-9),
                min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,
-               min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), held_in_run)]  # fmt: skip
+               min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), left_over_held)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
     # the run or, where that is led astray by what is left, in the rig's equations.
     if one.places[0].startswith(SENSOR):
-        against += [min(held_in_run, 1.0 / max(one.held_up, 1e-9)), 1.0 / max(one.follows, 1e-9)]
+        against += [min(left_over_held, 1.0 / max(one.held_up, 1e-9)), 1.0 / max(one.follows, 1e-9)]
     share = max(against) ** c.steepness
     return float(1.0 / (1.0 + share))
 
