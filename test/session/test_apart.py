@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("rclpy")
 import rclpy
 from helpers import sessions
-from rclpy.executors import SingleThreadedExecutor
+from helpers.listener import listen
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
@@ -26,7 +26,6 @@ from pneumo_ros.log.parcel import pack
 from pneumo_ros.log.reading import read_log
 from pneumo_ros.nodes.interfaces import message_class
 from pneumo_ros.nodes.neighbours import LOOK_FOR, neighbours
-from pneumo_ros.nodes.qos import recorder_qos
 from pneumo_ros.session.claim import Claim, runtime_folder
 
 QUIET = ("--seed", "5", "--no-picture", "--no-report", "--no-summary")
@@ -145,18 +144,7 @@ def test_a_listener_outside_hears_what_nodes_hand_over_or_put_into_parcels(
     domain, path = sessions.own_domain(), tmp_path / "x.mcap"
     process = sessions.start(*ENDLESS, *options, "--output", str(path), domain=domain)
     sessions.wait_for(process, path.with_name("x.mcap.part"), ONE_CHUNK)
-    heard: dict[str, list[bytes]] = {topic.name: [] for topic in topics.EVERY_PERIOD}
-    with sessions.own_context(domain) as context:
-        node = rclpy.create_node("listener", context=context)
-        for topic in topics.EVERY_PERIOD:
-            qos, take = recorder_qos(topic.flow), heard[topic.name].append
-            node.create_subscription(message_class(topic.type), topic.name, take, qos, raw=True)
-        executor = SingleThreadedExecutor(context=context)
-        executor.add_node(node)
-        end = time.monotonic() + 60.0
-        while min(map(len, heard.values())) < HEARD and time.monotonic() < end:
-            executor.spin_once(timeout_sec=0.1)
-        executor.shutdown()
+    heard = listen(domain, HEARD)
     process.send_signal(2)
     said, _ = process.communicate(timeout=180)
     assert process.returncode == 0, said
