@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Part, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
-from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, shaped, with_shapes
+from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, shaped, shapes_of, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
@@ -60,6 +60,9 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
         best = _selected(search, limits)
     if best.size > 1:
         _refine(search, best, limits)
+        refined = _selected(search, limits)
+        if further and refined.fit is not best.fit and _much_left(search, refined) and room_for_more(search):
+            _climb(search, refined, max(limits.second_cost, limits.second_share * best.samples))
         _end(search, _selected(search, limits))
     best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
@@ -73,7 +76,6 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
     last.
     """
     problem, worth = search.problem, STEP * evident
-    misfit = max(MISFIT, MISFIT_OF_REFIT * score(problem, search.refit).level)
 
     def price(one: Fit) -> float:
         return score(problem, one).price
@@ -81,7 +83,7 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
     current, known, exchanges = start.fit, {start.size: start.price}, EXCHANGES
     for number in range(ROUNDS):
         search.progress(0.84 + 0.05 * number / ROUNDS, f"beside {current.candidate.label}")
-        while exchanges and score(problem, current).level > misfit:
+        while exchanges and _much_left(search, score(problem, current)):
             other = _one_exchanged(search, current)
             exchanges -= 1
             if other is None or price(other) > price(current) - worth:
@@ -102,6 +104,11 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
             current, known[size - 1] = less, price(less)
         if not room_for_more(search):
             break
+
+
+def _much_left(search: Search, one: Scored) -> bool:
+    """Whether a structure leaves so much that others may serve better."""
+    return one.level > max(MISFIT, MISFIT_OF_REFIT * score(search.problem, search.refit).level)
 
 
 def _one_less(problem: Problem, found: Fit) -> Fit | None:
@@ -129,7 +136,7 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
             return []
         others = [part for part in _compatible(problem, bare.candidate.laws) if part != law]
         screened = varied(candidate_scores(problem, bare, trials(problem, bare, others)), EXCHANGED[0], 2)
-        probes = problem.each(lambda one: (*probed_one(problem, bare, one), bare), screened)
+        probes = problem.each(lambda one: (*probed_one(problem, bare, _with_shape(problem, one)), bare), screened)
         return sorted(probes, key=lambda item: item[0])[:1]
 
     each = problem.each(instead, found.candidate.laws)
@@ -150,7 +157,7 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     leader = refreshed(problem, base)
     others = _compatible(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
-    chosen = probed(problem, leader, screened)[: counts[1]]
+    chosen = probed(problem, leader, [_with_shape(problem, one) for one in screened])[: counts[1]]
     short = short_fits(search, leader, chosen, (0.86, 0.86))
 
     def ended(one: Fit) -> Fit:
@@ -159,6 +166,19 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
         )
 
     return problem.each(ended, short[: counts[2]])
+
+
+def _with_shape(problem: Problem, one: CandidateScore) -> CandidateScore:
+    """A screened effect with its family's shape at nothing, where that needs no screening of its own."""
+    if len(one.parts) > 1:
+        return one
+    own = problem.parameters_of[one.parts[0]]
+    found = dict(zip((p.name for p in own), one.values, strict=True))
+    missing = shapes_of(problem.model, Candidate(one.parts))
+    if any(p.starts and not p.size for part in missing for p in problem.parameters_of[part]):
+        return one
+    more = [0.0 if p.size else found.get(p.name, p.typical) for part in missing for p in problem.parameters_of[part]]
+    return CandidateScore((*one.parts, *missing), (*one.values, *more), one.share)
 
 
 def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
@@ -210,6 +230,7 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     bare = refreshed(problem, bare)
     rivals = [part for part in _compatible(problem, bare.candidate.laws) if rival(problem, law, part)]
     screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
+    screened = [_with_shape(problem, one) for one in screened]
     ranked = probed(problem, bare, screened)
     promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
     chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
