@@ -200,3 +200,35 @@ def test_a_lip_that_opens_above_a_pressure_is_a_leak_wherever_the_spring_rests(e
     signed = [False, False, signs(SHAPES["leak.shape"])[0]]
     assert left_of(flows(0.0)[:, :2], signed[:2], law, nothing) > 0.25, "no hole and no gap opens"
     assert left_of(flows(margin), signed, law, nothing) < 0.06  # a hole that opens lets pass the more, the higher it is
+
+
+@pytest.mark.parametrize("critical", [0.15, 0.3, 0.45])
+def test_an_inlet_that_unchokes_at_its_own_pressure_ratio(critical: float) -> None:
+    """ISO 6358's ellipse with a critical ratio of its own over Eq. 4.7's flow, which unchokes at 0.528: what a line
+    over the ratio leaves was called a leak or heat.
+    """
+    ratios = np.linspace(0.25, 0.9, 120)
+    past = np.maximum(ratios - critical, 0.0) / (1.0 - critical)
+    nominal = np.maximum(ratios - 0.528, 0.0) / (1.0 - 0.528)
+    flow = 1e-3 * np.sqrt(1.0 - nominal**2)  # kg/s
+    law = 1e-3 * np.sqrt(1.0 - past**2) - flow
+    names = [a.name for a in airs.ATOMS]
+    columns = [k for k in SHAPES["orifice_coefficient.shape"].columns if names[k].startswith("inlet")]
+    gas = RigModel(load_rig()).plant().front
+    atoms = []
+    for column in columns:
+        p = tuple(float(k == column) for k in range(len(names)))
+        seen = []
+        for ratio, inflow in zip(ratios, flow, strict=True):
+            one = air_of(
+                float(ratio) * gas.supply_pressure, 0.045, 0.0, 0.0, 0.0, gas.supply_pressure, gas.supply_power, gas
+            )
+            one = one._replace(inflow=float(inflow), outflow=0.0)
+            z = (one.pressure * one.volume, *[one.temperature] * 3, 0.0, 0.0, one.pressure)
+            seen.append(airs.air(one, z, p) * one.volume / (one.exponent * one.temperature))
+        atoms.append(seen)
+    table, nothing = np.array(atoms).T, np.zeros((len(law), 0))
+    straight = [k for k, column in enumerate(columns) if "past" not in names[column]]
+    line = left_of(table[:, straight], [True] * len(straight), law, nothing)
+    whole = left_of(table, [True] * len(columns), law, nothing)
+    assert whole < 0.08 and whole < 0.5 * line

@@ -15,7 +15,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, secant
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.growth import _one_exchanged, grow
+from pneumo_ros.diagnosis.search.growth import _one_exchanged, _one_more, grow
 from pneumo_ros.diagnosis.search.parts import rival
 from pneumo_ros.diagnosis.search.screening import compatible
 from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
@@ -128,6 +128,21 @@ def test_what_a_law_does_nothing_like_is_tried_by_its_shape_alone() -> None:
     lawless = Problem(Sided(effects=effects), (made({"b": 1.0}),))
     poor = compete(lawless, Effort(), False, lambda share, what: None)
     assert score(lawless, poor.singles[0]).level > 100.0 * score(problem, search.singles[0]).level
+
+
+def test_a_further_effect_is_probed_with_its_shape() -> None:
+    """By its law alone the right one closes less than another effect that acts as well."""
+    effects = {name: one for name, one in _effects().items() if name in ("a", "d", "gauge")}
+    shape = PlainEffect("gauge.shape", ("left", "right", "both"), effects["gauge"].parameters)
+    problem = Problem(
+        Sided(effects=effects | {"gauge.shape": shape}), (made({"d": 1.0, "c": 0.2, "b": 1.0, "a": 0.4}),)
+    )
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    first = Candidate((("d", ""),))
+    base = fit(problem, first, problem.start(first, None, (0.3,)))
+    (found,) = _one_more(search, base, (10, 1, 1))
+    law = found.candidate.laws[1]
+    assert law[0] == "gauge" and found.candidate.shapes == (("gauge.shape", law[1]),)
 
 
 def test_a_secant_reproduces_the_step_and_nothing_else() -> None:
