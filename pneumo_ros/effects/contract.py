@@ -125,10 +125,14 @@ class Effect:
 
     def __post_init__(self) -> None:
         check_places(self.sites, self.places)
+        names = [p.name for p in self.parameters]
+        for name in dict.fromkeys(names):
+            if names.count(name) > 1:
+                raise ValueError(f"{names.count(name)} parameters are called {name!r}; give each a name of its own")
 
 
 def check_places(sites: tuple[str, ...], places: tuple[str, ...]) -> None:
-    """Refuse sites and places that the rig does not have.
+    """Refuse sites and places that the rig does not have, and no place where no sensor is at fault.
 
     Raises
     ------
@@ -142,6 +146,8 @@ def check_places(sites: tuple[str, ...], places: tuple[str, ...]) -> None:
     for place in places:
         if place not in PLACES and not place.startswith("sensor:"):
             raise ValueError(f"unknown place {place!r}; allowed: {', '.join(PLACES)}")
+    if not places and not any(site in CHANNELS for site in sites):
+        raise ValueError(f"no place; an effect that is no sensor's is blamed on one; allowed: {', '.join(PLACES)}")
 
 
 def by_column(

@@ -126,6 +126,14 @@ MISTAKES = {
         f'EFFECT = Effect(id="x", summary="x", sites=("left",), places=(), parameters=({GOOD},))\n',
         ["mine.py:3", "unknown site 'left'", "'both'"],
     ),
+    "no place": (
+        f'EFFECT = Effect(id="x", summary="x", sites=ENDS, places=(), parameters=({GOOD},))\n',
+        ["mine.py:3", "no place", "{end}_force"],
+    ),
+    "two parameters of one name": (
+        f'EFFECT = Effect(id="x", summary="x", sites=ENDS, places=("{{end}}_force",), parameters=({GOOD}, {GOOD}))\n',
+        ["mine.py:3", "2 parameters are called 'size'", "a name of its own"],
+    ),
     "broken Python": ("def term(:\n", ["mine.py:3", "SyntaxError"]),
     "an error on the way": ("SIZE = 1.0\nSHARE = SIZE / 0.0\n", ["mine.py:4", "ZeroDivisionError"]),
 }  # fmt: skip
