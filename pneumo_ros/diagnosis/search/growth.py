@@ -9,6 +9,7 @@ close: the misfit of a law must not pass for a second effect.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
-from pneumo_ros.diagnosis.search.parts import STEPS, reduced, rival, shaped, shapes_of, with_shapes
+from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, reduced, rival, shaped, shapes_of, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
@@ -172,13 +173,12 @@ def _with_shape(problem: Problem, one: CandidateScore) -> CandidateScore:
     """A screened effect with its family's shape at nothing, where that needs no screening of its own."""
     if len(one.parts) > 1:
         return one
-    own = problem.parameters_of[one.parts[0]]
-    found = dict(zip((p.name for p in own), one.values, strict=True))
     missing = shapes_of(problem.model, Candidate(one.parts))
     if any(p.starts and not p.size for part in missing for p in problem.parameters_of[part]):
         return one
-    more = [0.0 if p.size else found.get(p.name, p.typical) for part in missing for p in problem.parameters_of[part]]
-    return CandidateScore((*one.parts, *missing), (*one.values, *more), one.share)
+    found = dict(zip((p.name for p in problem.parameters_of[one.parts[0]]), one.values, strict=True))
+    more = [value for part in missing for value in beginnings(problem, part, found)]
+    return replace(one, parts=(*one.parts, *missing), values=(*one.values, *more))
 
 
 def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:

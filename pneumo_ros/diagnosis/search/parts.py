@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from pneumo_ros.arrays import Mask
@@ -60,20 +60,23 @@ def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:
 
 
 def _beginnings(problem: Problem, one: Fit, part: Part) -> list[float]:
-    """Start values, SI, of a part that has no effect yet.
-
-    Sizes are zero; a shape parameter starts where a law of the same family at the same site has found it, else at its
-    typical value."""
+    """:func:`beginnings` of a part beside a fit, whose laws of the same family at the same site count."""
     own = iter(problem.values(one.candidate, one.x).tolist())
     found = {
         (family_of(other[0]), other[1], p.name): next(own)
         for other in one.candidate.parts
         for p in problem.effect_parameters(Candidate((other,)))
     }
-    return [
-        0.0 if p.size else found.get((family_of(part[0]), part[1], p.name), p.typical)
-        for p in problem.effect_parameters(Candidate((part,)))
-    ]
+    here = (family_of(part[0]), part[1])
+    return beginnings(problem, part, {name: value for (*place, name), value in found.items() if tuple(place) == here})
+
+
+def beginnings(problem: Problem, part: Part, found: Mapping[str, float]) -> list[float]:
+    """Start values, SI, of a part that has no effect yet.
+
+    Sizes are zero; a shape parameter starts where a law of the same family at the same site has found it (``found``, by
+    name), else at its typical value."""
+    return [0.0 if p.size else found.get(p.name, p.typical) for p in problem.parameters_of[part]]
 
 
 def reduced(
