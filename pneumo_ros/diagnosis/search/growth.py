@@ -224,7 +224,7 @@ def _end(search: Search, best: Scored) -> None:
 
 def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     """The likeliest of a structure and those with one effect exchanged for the best rivals of its place: the one that
-    the probes prefer and, because these see laws without their shapes, the one that the screening does, or the next.
+    the probes prefer and, because these are short, the one that the screening does, or the next.
     """
     problem, effort = search.problem, search.effort
     bare = refreshed(problem, bare)

@@ -33,6 +33,7 @@ HEAT_CAPACITY = 1005.0  # J/(kg K), of air at constant pressure
 SLOW = (0.05, 0.2)  # m/s, rates of the strut below which the exponent is lower
 MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
 KNEES = (0.3, 0.5)  # pressure ratios from which an inlet's flow may fall in another way
+BENT = 0.3  # pressure ratio past a knee at which its atom changes the flow by its amplitude
 SETTLES = (3.0, 12.0)  # s after a session's begin in which an orifice changes, as by ice
 
 ATOMS: tuple[Atom | EffectParameter, ...] = (
@@ -92,7 +93,7 @@ def air(air: Air, z: State, p: Values) -> float:
     leak = p[0] + p[1] * gap
     leak += p[2] * relieved(air.pressure, (1.0 + p[3]) * z[6]) / OPENING
     flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
-    past, beyond = max(ratio - KNEES[0], 0.0) / 0.3, max(ratio - KNEES[1], 0.0) / 0.3
+    past, beyond = max(ratio - KNEES[0], 0.0) / BENT, max(ratio - KNEES[1], 0.0) / BENT
     flow += air.inflow * (p[25] * past * past + p[26] * beyond * beyond)
     flow -= air.outflow * (p[7] + p[8] * (ATMOSPHERE / air.pressure - 0.5)) + leak * air.escape
     flow += p[18] + air.inflow * (p[23] * z[4] + p[24] * z[5]) - air.outflow * (p[21] * z[4] + p[22] * z[5])

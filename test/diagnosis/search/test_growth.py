@@ -145,6 +145,18 @@ def test_a_further_effect_is_probed_with_its_shape() -> None:
     assert law[0] == "gauge" and found.candidate.shapes == (("gauge.shape", law[1]),)
 
 
+def test_what_takes_an_effects_place_is_probed_with_its_shape() -> None:
+    size = _effects()["a"].parameters
+    sites = {"a": "", "d": "", "scale": "left", "gauge": "left", "gauge.shape": "left"}
+    effects = {name: PlainEffect(name, (site,), size) for name, site in sites.items()}
+    problem = Problem(Sided(effects=effects), (made({"a": 1.0, "c": 0.2, "b": 1.0, "d": 0.4}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    wrong = Candidate((("a", ""), ("scale", "left")))
+    other = _one_exchanged(search, fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3))))
+    assert other is not None and set(other.candidate.laws) == {("a", ""), ("gauge", "left")}
+    assert other.candidate.shapes == (("gauge.shape", "left"),)
+
+
 def test_a_secant_reproduces_the_step_and_nothing_else() -> None:
     columns = RNG.normal(size=(50, 2, 3))
     moved, change = np.array([0.2, -0.1, 0.4]), RNG.normal(size=(50, 2))
