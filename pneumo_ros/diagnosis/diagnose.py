@@ -324,6 +324,7 @@ def _evidence(outcome: Outcome) -> dict[str, float]:
     out |= {f"instead:{one.family}": one.instead for one in outcome.closable.effects if one.instead < 1.0}
     out |= {f"unheld:{effect.family}": effect.unheld for effect in outcome.closable.effects}
     out |= {f"follows:{one.family}": one.follows for one in outcome.closable.effects if np.isfinite(one.follows)}
+    out |= {f"varied:{one.family}": one.varied for one in outcome.closable.effects if np.isfinite(one.varied)}
     return out | {f"gap_{name}": run.total for name, run in outcome.runs.items()}
 
 

@@ -116,6 +116,16 @@ class HasChanges(Protocol):
 
 
 @runtime_checkable
+class NeedsVariety(Protocol):
+    """An effect whose law is shown only where what it is a function of takes more than one value."""
+
+    def varied(self, site: str) -> float:
+        """Share (mean square) of what the law is a function of that its sign alone does not explain, along the logs
+        that were fitted: where it is next to none, a law that knows the sign alone would do as well.
+        """
+
+
+@runtime_checkable
 class HasDerived(Protocol):
     """An effect whose parameters give further quantities together."""
 

@@ -31,6 +31,7 @@ SEARCHES = 12  # steps in the search of a size
 FINEST, MOST_STEPS = 0.7, 40  # rad in a sub-step; sub-steps in a period
 FOR_FRICTION = 2  # sub-steps that friction alone is given: beyond them its turnover is widened
 NARROW = 0.04  # of the usual rate: what friction may turn over within
+ADIABATIC = 1.4  # ratio of specific heats of air and other gases of two atoms: the largest of the usual ones
 
 
 @dataclass(frozen=True)
@@ -112,8 +113,9 @@ class Scaler:
             low, high = (float(v) for v in np.quantile(seen[:, 0], [0.002, 0.998]))
             size = self._evident(k, inside, fl.STEADY)
             nominal = float(np.quantile(np.abs(seen[:, 2]), 0.95))
+            settles = self._settles(k, slot, high)
             return Measures(size, max(high - low, 1e-12) / slow, max(high - low, 1e-12), low, max(high, 1e-12), nominal,
-                            slow, whole, slot.unit, slot.pressure_unit)  # fmt: skip
+                            slow, whole, slot.unit, slot.pressure_unit, settles=settles)  # fmt: skip
         assert isinstance(slot, Force)
         S = inside[k]
         moving = float(np.ptp(seen[:, 1])) > 0.0
@@ -121,7 +123,14 @@ class Scaler:
         low, high = float(S[fo.S_BELOW]), float(S[fo.S_ABOVE])
         load = float(np.quantile(np.abs(seen[:, 2]), 0.95))
         return Measures(size, float(S[fo.S_RATE]), float(S[fo.S_SWING]), low, high, load, slow, whole, slot.unit,
-                        slot.travel_unit)  # fmt: skip
+                        slot.travel_unit, varied=varied(seen[:, 1]))  # fmt: skip
+
+    def _settles(self, k: int, slot: Flow, pressure: float) -> float:
+        """What flows out at most while a gas at some pressure cools: filled to it from nothing and with no heat lost,
+        it is :data:`ADIABATIC` times as warm as what was let in, so that its pressure falls to that part of itself.
+        """
+        moved = abs(self._change(k, 0))
+        return (1.0 - 1.0 / ADIABATIC) * abs(pressure) / moved if slot.gas and moved > 0.0 else np.inf
 
     def _evident(self, k: int, inside: Array, column: int) -> float:
         """Size of one value at a slot that moves the windows' outputs by :data:`EVIDENT` of what the log moves."""
@@ -199,13 +208,18 @@ class Scaler:
 
     def _mobility(self, k: int) -> float:
         """By differences at the first window: of the slot's rate over the states, and of the states over its force."""
-        slot, w = self.physics.inside[k], self.windows[0]
-        if not isinstance(slot, Force):
+        w = self.windows[0]
+        if not isinstance(self.physics.inside[k], Force):
             return 0.0
         if self.physics.kernel.mobility is not None:
             found = self.physics.kernel.mobility(k, w.state, w.record.inputs, self.held, self.period, self.nominal)
             return found if np.isfinite(found) else 0.0
-        if len(w.state) == 0:
+        return self._change(k, 1)
+
+    def _change(self, k: int, coordinate: int) -> float:
+        """What a slot's coordinate changes by in a second for a unit of what acts there; 0 where nobody knows."""
+        w = self.windows[0]
+        if len(w.state) == 0 or self.physics.kernel.mobility is not None:
             return 0.0
         slots, u = len(self.physics.inside), w.record.inputs[0]
         f = np.zeros(slots)
@@ -216,10 +230,21 @@ class Scaler:
         def rate(state: Array) -> float:
             out = np.zeros((slots, 3))
             self.physics.kernel.coordinates(state, u, self.nominal, out)
-            return float(out[k, 1])
+            return float(out[k, coordinate])
 
         steps = 1e-6 * np.maximum(1e-3, np.abs(w.state))
         here = rate(w.state)
         slope = [(rate(w.state + s * e) - here) / s for s, e in zip(steps, np.eye(len(steps)), strict=True)]
         found = float(np.array(slope) @ pushed)
         return found if np.isfinite(found) else 0.0
+
+
+def varied(rate: Array) -> float:
+    """Share of a rate (mean square) that its direction alone does not explain: 0 at one speed out and one back.
+
+    A force in proportion to the rate is told from dry friction by this part only. 1 where nothing moves.
+    """
+    whole = float(np.sum(rate**2))
+    ways = [rate[rate > 0.0], rate[rate < 0.0]]
+    told = sum(len(way) * float(np.mean(way)) ** 2 for way in ways if len(way))
+    return 1.0 - told / whole if whole > 0.0 else 1.0

@@ -37,6 +37,9 @@ class Measures:
     load : usual load, or nominal flow; of a signal its peak
     period, whole : s, of the slowest motion and of the record
     unit, travel_unit : of the size and of the travel
+    varied : share of the rate (mean square) that its direction alone does not explain: 0 at one speed each way, 0.19
+        where it swings as a sine, 0.36 where it is random
+    settles : how much can flow at most while the gas there cools from its filling; infinite where nothing is known
     """
 
     size: float
@@ -49,6 +52,18 @@ class Measures:
     whole: float
     unit: str
     travel_unit: str
+    varied: float = 1.0
+    settles: float = np.inf
+
+
+def without_limit(m: Measures) -> float:
+    """Of what nature sets no end."""
+    return np.inf
+
+
+def cooling(m: Measures) -> float:
+    """Of what air gives back that its filling has warmed."""
+    return m.settles
 
 
 @dataclass(frozen=True)
@@ -65,6 +80,7 @@ class Knob:
     size : zero means that the law is absent
     ends : what lies at its lower and at its upper bound
     starts : further values to start from, in typical ones
+    most : largest value of either sign that nature allows, from the slot's measures
     """
 
     name: str
@@ -76,17 +92,22 @@ class Knob:
     size: bool = True
     starts: tuple[float, ...] = (8.0,)
     ends: tuple[End, End] = (End.LIMIT, End.LIMIT)
+    most: Callable[[Measures], float] = without_limit
 
 
 @dataclass(frozen=True)
 class Law:
-    """A law of a family at slots of some kinds."""
+    """A law of a family at slots of some kinds.
+
+    ``by_rate`` : what it claims is how a force changes with the rate
+    """
 
     id: str
     kinds: tuple[str, ...]
     summary: str
     knobs: tuple[Knob, ...]
     needs_load: bool = False
+    by_rate: bool = False
 
 
 def _size(m: Measures) -> float:
@@ -139,15 +160,16 @@ FORCE_LAWS = (
     Law("coulomb_friction.loaded", FORCES, "dry friction in proportion to the load",
         (Knob("friction_coefficient", "1", fo.LOADED, _share),), needs_load=True),
     Law("viscous_damping", FORCES, "damping in proportion to the rate",
-        (Knob("damping", NS, fo.VISCOUS, _per_rate, -MOST),)),
+        (Knob("damping", NS, fo.VISCOUS, _per_rate, -MOST),), by_rate=True),
     Law("viscous_damping.one_sided", FORCES, "damping, another one each way",
         (Knob("damping_out", NS, fo.DAMPING_OUT, _per_rate, -MOST),
-         Knob("damping_in", NS, fo.DAMPING_IN, _per_rate, -MOST))),
+         Knob("damping_in", NS, fo.DAMPING_IN, _per_rate, -MOST)), by_rate=True),
     Law("viscous_damping.degressive", FORCES, "damping that grows ever less with the rate",
         (Knob("damping", NS, fo.DEGRESSIVE, _per_rate),
-         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.7, 5.0, (3.0,), End.OTHER))),
+         _shape("knee_rate", MS, fo.DEGRESSIVE_RATE, _rate, 0.7, 5.0, (3.0,), End.OTHER)), by_rate=True),
     Law("viscous_damping.quadratic", FORCES, "damping with the square of the rate",
-        (Knob("square_damping", "{unit} s2/{travel}2", fo.SQUARE_DAMPING, lambda m: m.size / m.rate**2),)),
+        (Knob("square_damping", "{unit} s2/{travel}2", fo.SQUARE_DAMPING, lambda m: m.size / m.rate**2),),
+        by_rate=True),
     Law("hysteresis", FORCES, "rate-independent hysteresis (Bouc-Wen)",
         (Knob("hysteresis_force", N, fo.BOUC_WEN, _size),
          _shape("yield_travel", M, fo.BOUC_WEN_TRAVEL, lambda m: 0.4 * m.travel, 0.25, 10.0, (0.5, 3.0),
@@ -177,7 +199,7 @@ FORCE_LAWS = (
     Law("relaxation", FORCES, "a spring whose force fades (rubber, creep)",
         (Knob("fading_stiffness", NM, fo.MEMORY, _per_travel),
          _shape("fading_time", "s", fo.MEMORY_TIME, lambda m: 0.1 * m.period, 0.05, 20.0, (0.3, 5.0),
-                End.OTHER, End.OTHER))),
+                End.OTHER, End.OTHER)), by_rate=True),
     Law("resonance", FORCES, "something that rings: a mass on a spring",
         (Knob("ringing_mass", "{unit} s2/{travel}", fo.MASS, lambda m: m.size * m.period / m.rate / 6.0),
          _shape("ringing_frequency", "rad/s", fo.FREQUENCY, lambda m: 12.0 / m.period, 0.2, 8.0, (0.5, 2.0, 4.0),
@@ -210,7 +232,7 @@ FLOW_LAWS = (
         (Knob("sag", "1", fl.DROOP, _share),
          _shape("sag_time", "s", fl.DROOP_TIME, lambda m: 0.1 * m.period, 0.01, 30.0, (0.2, 5.0))), needs_load=True),
     Law("heat", FLOW, "filling has warmed or cooled what settles now",
-        (Knob("settling", "{unit} s", fl.HEAT, lambda m: 0.1 * m.size * m.whole, -MOST),
+        (Knob("settling", "{unit} s", fl.HEAT, lambda m: 0.1 * m.size * m.whole, -MOST, most=cooling),
          _shape("settling_time", "s", fl.HEAT_TIME, lambda m: 0.04 * m.whole, 0.05, 4.0, (0.25, 3.0),
                 End.LIMIT, End.LIMIT))),
 )  # fmt: skip

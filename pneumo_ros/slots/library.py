@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from pneumo_ros.effects.guide import Guide
 from pneumo_ros.effects.parameters import ANYTHING, SHAPE, Derived, EffectParameter, family_of
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
@@ -25,6 +27,7 @@ class SlotEffect:
     sites : places of the slots
     by_site : parameters where it acts: units and usual sizes are the slot's
     columns : where they stand among the slot's values
+    variety : of a law that claims how a force changes with the rate: how varied the rate was where it acts
     """
 
     id: str
@@ -34,11 +37,16 @@ class SlotEffect:
     columns: Mapping[str, tuple[int, ...]]
     derived: tuple[Derived, ...] = field(default=())
     guide: Guide | None = None
+    variety: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def parameters(self) -> tuple[EffectParameter, ...]:
         """Those at the first site."""
         return self.by_site[self.sites[0]]
+
+    def varied(self, site: str) -> float:
+        """How varied what the law is over was at a site, see :class:`~pneumo_ros.diagnosis.traits.NeedsVariety`."""
+        return self.variety.get(site, np.inf)
 
 
 def effects_of(
@@ -71,7 +79,7 @@ def _joined(known: SlotEffect | None, one: SlotEffect) -> SlotEffect:
     if known is None:
         return one
     return replace(known, sites=(*known.sites, *one.sites), by_site={**known.by_site, **one.by_site},
-                   columns={**known.columns, **one.columns})  # fmt: skip
+                   columns={**known.columns, **one.columns}, variety={**known.variety, **one.variety})  # fmt: skip
 
 
 def _at(slot: Slot, m: Measures) -> Iterator[SlotEffect]:
@@ -88,9 +96,9 @@ def _at(slot: Slot, m: Measures) -> Iterator[SlotEffect]:
 def _law(law: Law, slot: Slot, m: Measures) -> SlotEffect:
     parameters = tuple(_parameter(knob, m) for knob in law.knobs)
     columns = tuple(knob.column for knob in law.knobs)
-    return SlotEffect(
-        law.id, law.summary, (slot.place,), {slot.place: parameters}, {slot.place: columns}, guide=_guide(law)
-    )
+    variety = {slot.place: m.varied} if law.by_rate else {}
+    return SlotEffect(law.id, law.summary, (slot.place,), {slot.place: parameters}, {slot.place: columns},
+                      guide=_guide(law), variety=variety)  # fmt: skip
 
 
 def _guide(law: Law) -> Guide:
@@ -100,9 +108,11 @@ def _guide(law: Law) -> Guide:
 
 def _parameter(knob: Knob, m: Measures) -> EffectParameter:
     typical = knob.typical(m)
-    starts = tuple(s * typical for s in knob.starts if knob.low <= s <= knob.high)
     unit = knob.unit.format(unit=m.unit, travel=m.travel_unit)
-    low, high = knob.low * typical, knob.high * typical
+    most = max(knob.most(m), np.finfo(float).tiny)
+    typical = min(typical, most)
+    low, high = max(knob.low * typical, -most), min(knob.high * typical, most)
+    starts = tuple(s * typical for s in knob.starts if low <= s * typical <= high)
     own, other = (
         tuple(bound for bound, end in zip((low, high), knob.ends, strict=True) if end is kind)
         for kind in (End.OWN, End.OTHER)
@@ -113,8 +123,15 @@ def _parameter(knob: Knob, m: Measures) -> EffectParameter:
 def _atoms(name: str, summary: str, slot: Slot, m: Measures, columns: Sequence[int], every_sign: bool) -> SlotEffect:
     rows = {column: row for row in ROWS[slot.kind] for column in row.columns()}
     kept = tuple(c for c in columns if c in rows and (m.load > 0.0 or rows[c].name not in _NEED_LOAD))
-    parameters = tuple(amplitude(_atom(rows[c], c, m), every_sign) for c in kept)
+    parameters = tuple(_bounded(amplitude(_atom(rows[c], c, m), every_sign), rows[c], m, every_sign) for c in kept)
     return SlotEffect(name, summary, (slot.place,), {slot.place: parameters}, {slot.place: kept})
+
+
+def _bounded(parameter: EffectParameter, row: Row, m: Measures, every_sign: bool) -> EffectParameter:
+    """A family's atom keeps to what nature allows it; whatever may act keeps to nothing."""
+    most = np.inf if every_sign else max(row.most(m), np.finfo(float).tiny)
+    return replace(parameter, low=max(parameter.low, -most), high=min(parameter.high, most),
+                   typical=min(parameter.typical, most))  # fmt: skip
 
 
 _NEED_LOAD = ("load_friction", "share", "droop")

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
 from pneumo_ros.slots import signal as si
-from pneumo_ros.slots.laws import Measures
+from pneumo_ros.slots.laws import Measures, cooling, without_limit
 
 
 @dataclass(frozen=True)
 class Row:
     """Atoms of one sort: their columns, unit and typical amplitude.
 
-    ``signed`` : a family that holds them may use them with either sign
+    ``signed`` : a family that holds them may use them with either sign; ``most`` : largest value that nature allows it
     """
 
     name: str
@@ -25,6 +25,7 @@ class Row:
     unit: str
     typical: Callable[[Measures], float]
     signed: bool = False
+    most: Callable[[Measures], float] = without_limit
 
     def columns(self, start: int = 0, stop: int | None = None) -> tuple[int, ...]:
         """Some or all of its columns."""
@@ -74,7 +75,7 @@ OPENS = Row("hole that opens", fl.OPENS, 4, "{unit}/{travel}", _per_pressure)
 FLOWS = Row("share", fl.A_FLOW, 4, "1", _share, signed=True)
 RELIEFS = Row("relief", fl.RELIEFS, 4, "{unit}/{travel}", lambda m: 3.0 * m.size / m.travel)
 DROOPS = Row("droop", fl.DROOPS, 3, "1", _share)
-HEATS = Row("settling", fl.HEATS, 4, "{unit} s", lambda m: 0.1 * m.size * m.whole, signed=True)
+HEATS = Row("settling", fl.HEATS, 4, "{unit} s", lambda m: 0.1 * m.size * m.whole, signed=True, most=cooling)
 CONSTANT_FLOW = Row("constant", fl.STEADY, 1, "{unit}", _size, signed=True)
 
 VALUES = Row("power", si.POWERS, 4, "1", lambda m: 0.03, signed=True)

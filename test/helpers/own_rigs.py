@@ -66,6 +66,25 @@ def cart_log(path: Path, friction: float, seconds: float = 16.0, seed: int = 1, 
     return path
 
 
+def cylinder_log(path: Path, friction: float, damping: float, speeds: tuple[float, ...]) -> Path:
+    """A cylinder of 25 mm under 3 bar whose rod goes to and fro over 60 mm, in turn at each of some speeds (m/s), read
+    as the rig file of ``examples/cylinder`` has it; ``friction`` N and ``damping`` N s/m hold the rod back, so that the
+    load cell pushes by as much more.
+    """
+    period, rng = 0.01, np.random.default_rng(5)
+    legs = [leg for k in range(12) for speed in [speeds[k % len(speeds)]]
+            for leg in (np.arange(0.0, 0.06, speed * period), np.arange(0.06, 0.0, -speed * period))]  # fmt: skip
+    position = np.concatenate(legs)
+    speed = np.gradient(position, period)
+    t = 7.0 + period * np.arange(len(position))
+    pressure = 3e5 + 8e3 * np.sin(0.9 * t)
+    force = 4.909e-4 * pressure + friction * np.tanh(speed / 1e-3) + damping * speed + rng.normal(0.0, 0.3, len(t))
+    nothing = np.zeros(len(t))
+    table = np.column_stack([1e3 * t, nothing, nothing, nothing, 1e3 * position, 1e-5 * pressure, force])
+    np.savetxt(path, table, "%.5f", ",")
+    return path
+
+
 def chamber_log(path: Path, seed: int, rate: float) -> Path:
     """A chamber that loses ``rate`` of its pressure above ambient a second, 120 s at 10 Hz, 0.0015 bar of noise."""
     t = np.arange(0.0, 120.0, 0.1)

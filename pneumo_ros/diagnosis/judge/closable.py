@@ -25,7 +25,7 @@ from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.parts import reduced, with_parts
 from pneumo_ros.diagnosis.search.screening import SENSOR
-from pneumo_ros.diagnosis.traits import ActsElsewhere, IsFollowed
+from pneumo_ros.diagnosis.traits import ActsElsewhere, IsFollowed, NeedsVariety
 from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
@@ -67,6 +67,8 @@ class EffectEvidence:
         left there without it, mean squares in null variances; None where nobody looked, or the tolerances answer for it
     mended : share of what the refit leaves in the equations that it acts in that the structure leaves as well, mean
         square above noise; infinite where nobody looked, or where they hardly show a gap
+    varied : how varied what its law is a function of was along the logs, see
+        :class:`~pneumo_ros.diagnosis.traits.NeedsVariety`; infinite where its law needs no variety
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -85,6 +87,7 @@ class EffectEvidence:
     follows: float = np.inf
     missing: tuple[float, float] | None = None
     mended: float = np.inf
+    varied: float = np.inf
 
     @property
     def family(self) -> str:
@@ -204,7 +207,7 @@ def closable(
                 missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
-            at_bounds=firm, bent=bent,
+            at_bounds=firm, bent=bent, varied=_varied(problem, law),
             follows=_followed(problem, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
@@ -222,6 +225,11 @@ def worth_asking(left: float, own: float, floor: float) -> bool:
     ``left`` and ``own`` : mean squares of the held-out gap above the floor; ``floor`` : as the contract's gap
     """
     return left + TRACE * floor**2 < (1.0 - WORTH) * own
+
+
+def _varied(problem: Problem, law: Part) -> float:
+    effect = problem.model.effects[law[0]]
+    return effect.varied(law[1]) if isinstance(effect, NeedsVariety) else np.inf
 
 
 def _followed(problem: Problem, holdout: Record, predicted: Array, law: Part, places: Sequence[str]) -> float:

@@ -50,6 +50,8 @@ class Calibration:
         does not have; of an effect whose own equations show a gap no more than there, for others may miss the most
     unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
         likely something else, unless it holds as much of the run (mean square) as is left there in all
+    varied : share of what an effect's law is a function of that its sign does not explain, at which it is as likely
+        something that knows the sign alone: dry friction and damping draw one picture at one speed
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
@@ -70,6 +72,7 @@ class Calibration:
     leaves: float = 1.35
     steepness: float = 4.0
     real: float = 1.5
+    varied: float = 0.09
     at_bounds: float = 0.9
     bent: float = 0.25
     least: float = 0.004
@@ -204,7 +207,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
     stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
     left_over_held = one.own / max(one.without - one.own, 1e-12)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
-               stuck / c.at_bounds, c.least / max(one.share, 1e-9),
+               stuck / c.at_bounds, c.varied / max(one.varied, 1e-9), c.least / max(one.share, 1e-9),
                min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,

@@ -219,6 +219,9 @@ def why_not(summary: Mapping[str, Any]) -> str:
         bounded = float(evidence.get(f"at_bounds:{effect}") or 0.0)
         if bounded >= limits.at_bounds and not stopped:
             reasons.append(f"{bounded:.0f} of its parameters stop at the ends of their ranges")
+        if float(evidence.get(f"varied:{effect}", 1.0)) < limits.varied:
+            reasons.append(f"the log moves at one speed each way, where {effect_name(effect)} looks like what does not "
+                           f"change with the rate: drive it at half and at twice that speed as well")  # fmt: skip
         if float(evidence.get(f"follows:{effect}", 1.0)) < 1.0:
             reasons.append("the reading stops at an end of its range, as that of a sensor at its limit does")
     if float(evidence.get("kept_chosen", 0.0)) >= limits.kept:

@@ -50,6 +50,7 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
             ),
             FAR,
         ),
+        "one value is all its law was seen at": (replace(SURE, varied=c.varied / k), FAR),
         "a reading that stops": (replace(SURE, places=("sensor:front_pressure",), follows=1.0 / k), FAR),
     }
 
