@@ -28,7 +28,7 @@ from bokeh.plotting import figure
 
 from pneumo_ros.dashboard.pace import Pace
 from pneumo_ros.dashboard.panels import PANELS, Line, Panel, Samples, derive, thin
-from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, wrapping
+from pneumo_ros.dashboard.shell import furnish, legend_above, side_by_side, whole_label, wrapping
 from pneumo_ros.dashboard.source import Control, Controls, Playback, Source, Status
 from pneumo_ros.log.inspection import Event
 from pneumo_ros.printable import one_line
@@ -37,7 +37,7 @@ REFRESH_MS = 100  # ten pictures a second look fluid and cost 5 % of a core
 WINDOW = 10.0  # s shown
 POINTS = 600  # a curve; more than the pixels a panel is wide at two a stretch
 PANEL_HEIGHT = 190  # px
-WIDGET = 330  # px; the longest name of a parameter with its unit and range fits above its field
+WIDGET = 330  # px; what a telephone has room for. A longer name of a parameter goes on in a second line
 EVENTS_SHOWN = 200
 ANSWERS_SHOWN = 6
 # Said when the picture is on the screen: what a browser has drawn is a frame and a turn of its loop later.
@@ -174,6 +174,7 @@ class Page:
                 title=title, value=control.value, low=control.low, high=control.high, name=name, width=WIDGET
             )
             widget.step = max(abs(float(control.value)) / 20.0, 1e-6)
+        widget.stylesheets = [whole_label()]
         widget.on_change("active" if isinstance(widget, Toggle) else "value", self._changer(control))
         return widget
 

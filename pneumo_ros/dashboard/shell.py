@@ -19,6 +19,8 @@ ROOM = 44  # characters of a legend's line; a telephone cuts off what is longer
 _TEMPLATE = """{% extends base %}
 {% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
 """
+# How wide a text is depends on the fonts of who looks: in DejaVu Sans the longest name is wider than its field.
+_WHOLE = ".bk-input-group, .bk-btn { white-space: normal; }"
 _WRAP = ":host { flex-wrap: wrap; }"
 _HALF = f"""
 :host {{ flex: 1 1 45%; min-width: 0; }}
@@ -48,6 +50,11 @@ def legend_above(plot: Any, lines: Sequence[tuple[str, Any]], size: str = "10px"
         legend.ncols = max(1, ROOM // max(len(name) for name, _ in lines))
     plot.add_layout(legend, "above")
     return plot
+
+
+def whole_label() -> InlineStyleSheet:
+    """A widget's name in as many lines as it needs, so that it does not run into its neighbour's."""
+    return InlineStyleSheet(css=_WHOLE)
 
 
 def wrapping(*widgets: Any, **options: Any) -> Any:
