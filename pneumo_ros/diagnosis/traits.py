@@ -121,7 +121,8 @@ class NeedsVariety(Protocol):
 
     def varied(self, site: str) -> float:
         """Share (mean square) of what the law is a function of that its sign alone does not explain, along the logs
-        that were fitted: where it is next to none, a law that knows the sign alone would do as well.
+        that were fitted: where it is next to none, a law that knows the sign alone would do as well. Infinite for a law
+        that asks for no variety.
         """
 
 

@@ -126,8 +126,9 @@ class Scaler:
                         slot.travel_unit, varied=varied(seen[:, 1]))  # fmt: skip
 
     def _settles(self, k: int, slot: Flow, pressure: float) -> float:
-        """What flows out at most while a gas at some pressure cools: filled to it from nothing and with no heat lost,
-        it is :data:`ADIABATIC` times as warm as what was let in, so that its pressure falls to that part of itself.
+        """What seems to flow out at most while a gas at some pressure (absolute) cools: filled to it from nothing and
+        with no heat lost, it is :data:`ADIABATIC` times as warm as what was let in, so that its pressure falls to that
+        part of itself. Infinite where the slot is no gas's.
         """
         moved = abs(self._change(k, 0))
         return (1.0 - 1.0 / ADIABATIC) * abs(pressure) / moved if slot.gas and moved > 0.0 else np.inf

@@ -39,7 +39,8 @@ class Measures:
     unit, travel_unit : of the size and of the travel
     varied : share of the rate (mean square) that its direction alone does not explain: 0 at one speed each way, 0.19
         where it swings as a sine, 0.36 where it is random
-    settles : how much can flow at most while the gas there cools from its filling; infinite where nothing is known
+    settles : how much can seem to flow out at most while the gas there cools from its filling; infinite where nothing
+        is known
     """
 
     size: float
@@ -62,7 +63,9 @@ def without_limit(m: Measures) -> float:
 
 
 def cooling(m: Measures) -> float:
-    """Of what air gives back that its filling has warmed."""
+    """Of what seems to flow out while air cools that its filling has warmed; what emptying has cooled has no such end,
+    for an expansion may cool as far as one likes.
+    """
     return m.settles
 
 
@@ -80,7 +83,7 @@ class Knob:
     size : zero means that the law is absent
     ends : what lies at its lower and at its upper bound
     starts : further values to start from, in typical ones
-    most : largest value of either sign that nature allows, from the slot's measures
+    most : largest value that nature allows, from the slot's measures
     """
 
     name: str

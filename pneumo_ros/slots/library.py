@@ -111,7 +111,7 @@ def _parameter(knob: Knob, m: Measures) -> EffectParameter:
     unit = knob.unit.format(unit=m.unit, travel=m.travel_unit)
     most = max(knob.most(m), np.finfo(float).tiny)
     typical = min(typical, most)
-    low, high = max(knob.low * typical, -most), min(knob.high * typical, most)
+    low, high = knob.low * typical, min(knob.high * typical, most)
     starts = tuple(s * typical for s in knob.starts if low <= s * typical <= high)
     own, other = (
         tuple(bound for bound, end in zip((low, high), knob.ends, strict=True) if end is kind)
@@ -130,8 +130,7 @@ def _atoms(name: str, summary: str, slot: Slot, m: Measures, columns: Sequence[i
 def _bounded(parameter: EffectParameter, row: Row, m: Measures, every_sign: bool) -> EffectParameter:
     """A family's atom keeps to what nature allows it; whatever may act keeps to nothing."""
     most = np.inf if every_sign else max(row.most(m), np.finfo(float).tiny)
-    return replace(parameter, low=max(parameter.low, -most), high=min(parameter.high, most),
-                   typical=min(parameter.typical, most))  # fmt: skip
+    return replace(parameter, high=min(parameter.high, most), typical=min(parameter.typical, most))
 
 
 _NEED_LOAD = ("load_friction", "share", "droop")

@@ -72,7 +72,7 @@ def cylinder_log(path: Path, friction: float, damping: float, speeds: tuple[floa
     load cell pushes by as much more.
     """
     period, rng = 0.01, np.random.default_rng(5)
-    legs = [leg for k in range(12) for speed in [speeds[k % len(speeds)]]
+    legs = [leg for speed in (speeds * 12)[:12]
             for leg in (np.arange(0.0, 0.06, speed * period), np.arange(0.06, 0.0, -speed * period))]  # fmt: skip
     position = np.concatenate(legs)
     speed = np.gradient(position, period)

@@ -54,6 +54,7 @@ def test_air_that_cools_from_its_filling_keeps_five_sevenths_of_its_pressure(tmp
     task = prepared(EXAMPLES / "chamber" / "rig.py", [chamber_log(tmp_path / "log.csv", 1, 5e-3)])
     law, shape, anything = (task.model.effects[name].parameters for name in ("heat", "heat.shape", "anything.flow"))
     high = 8.0e5  # 7 bar above the ambient pressure
-    assert law[0].high == -law[0].low == pytest.approx((1.0 - 1.0 / 1.4) * high, rel=0.01)
+    assert law[0].high == pytest.approx((1.0 - 1.0 / 1.4) * high, rel=0.01)
+    assert law[0].low < -3.0 * law[0].high  # what emptying has cooled
     assert all(atom.high == pytest.approx(law[0].high) and atom.typical <= atom.high for atom in shape)
     assert max(atom.high for atom in anything if atom.name.startswith("settling")) > 3.0 * law[0].high
