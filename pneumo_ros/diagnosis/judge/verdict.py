@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.search.screening import SENSOR
 from pneumo_ros.diagnosis.search.selection import SHARPNESS, Scored, by_families, log_weight
 from pneumo_ros.effects.parameters import family_of
+
+# Times another's share that an effect must hold to be the larger of two: shares are known to about a fifth [numerics]
+LARGER: Final = 1.25
 
 
 @dataclass(frozen=True)
@@ -47,9 +51,10 @@ class Calibration:
         that to say nothing: what explains less is no rival
     kept : share of what the refit leaves in the rig's own equations along the held-out log, mean square above noise,
         that the structure must leave to be as likely something else: it moves the run by forces and flows that the rig
-        does not have; of an effect whose own equations show a gap no more than there, for others may miss the most
+        does not have; of an effect whose own equations show a gap no more than there, for others may miss the most,
+        and of none that holds more of the run (mean square) than is left of it in all
     unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
-        likely something else, unless it holds as much of the run (mean square) as is left there in all
+        likely something else, with the same exception
     varied : share of what an effect's law is a function of that its sign does not explain, at which it is as likely
         something that knows the sign alone: dry friction and damping draw one picture at one speed
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
@@ -186,16 +191,16 @@ def judge(
 
 
 def _beside_unnamed(trust: Mapping[Part, float], evidence: Sequence[EffectEvidence]) -> dict[Part, float]:
-    """Probability of each effect, at most that of every larger effect that is blamed on the same place.
+    """Probability of each effect, at most that of every evidently larger one that is blamed on the same place.
 
-    Where the larger one at a place is probably misnamed, the smaller one may be a remainder of it. A sensor's error is
-    bounded by larger effects at any place, because what moves the rig can look like one. Effects that the held-out log
-    does not miss, above noise and model form, bound nothing."""
+    Where the larger one at a place is probably misnamed, the smaller one may be a remainder of it; of two that hold as
+    much neither is. A sensor's error is bounded by larger effects at any place, because what moves the rig can look
+    like one. Effects that the held-out log does not miss, above noise and model form, bound nothing."""
     out = dict(trust)
     for one in evidence:
         sensor = one.places[0].startswith(SENSOR)
         beside = [e for e in evidence if sensor or e.places[:1] == one.places[:1]]
-        larger = [e.law for e in beside if e.share > one.share and e.without > 0.0]
+        larger = [e.law for e in beside if e.share > LARGER * one.share and e.without > 0.0]
         out[one.law] = min([trust[one.law], *(trust[law] for law in larger)])
     return out
 
@@ -210,7 +215,8 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> 
                stuck / c.at_bounds, c.varied / max(one.varied, 1e-9), c.least / max(one.share, 1e-9),
                min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
-               c.traces / max(beyond(held.refit, 1.0), 1e-9), min(held.kept, one.mended) / c.kept,
+               c.traces / max(beyond(held.refit, 1.0), 1e-9),
+               min(held.kept / c.kept, one.mended / c.kept, left_over_held),
                min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), left_over_held)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
     # the run or, where that is led astray by what is left, in the rig's equations.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, credit,
 
 CONSTANTS = Calibration()
 SURE = EffectEvidence(("leak", "front"), ("front_air",), 1.0, 0.0, 0.0, share=1e3, beside=1e3)
+SLIGHT = replace(SURE, own=0.6, ceiling=0.6)  # holds less of the run than is left
 FAR = HeldOutGaps(1e6, 1.0)
 
 
@@ -39,14 +41,12 @@ def reasons(k: float) -> dict[str, tuple[EffectEvidence, HeldOutGaps]]:
             replace(SURE, places=("sensor:sprung_front",), own=k / (1.0 + k), ceiling=k / (1.0 + k)),
             FAR,
         ),
-        "the equations miss what they did": (SURE, replace(FAR, kept=k * c.kept)),
-        "its own miss what they did": (replace(SURE, mended=k * c.kept), replace(FAR, kept=10.0)),
+        "the equations miss what they did": (SLIGHT, replace(FAR, kept=k * c.kept)),
+        "its own miss what they did": (replace(SLIGHT, mended=k * c.kept), replace(FAR, kept=10.0)),
         "they miss nothing without it": (
             replace(
-                SURE,
+                SLIGHT,
                 missing=(1.0 + 1e6 * (c.unheld[0] + k * (c.unheld[1] - c.unheld[0])), 1.0 + 1e6),
-                own=0.6,
-                ceiling=0.6,
             ),
             FAR,
         ),
@@ -71,19 +71,20 @@ def test_what_the_equations_miss_is_named_beside_what_nobody_can_predict(without
     assert (credit(one, HeldOutGaps(100.0, 94.0), CONSTANTS) > 0.5) is named
 
 
+@pytest.mark.parametrize("missed", [{"missing": (15.0, 11.0)}, {"mended": 1.03}])
 @pytest.mark.parametrize("own, named", [(0.2, True), (0.45, True), (0.6, False)])
 def test_what_holds_more_of_the_run_than_is_left_stands_where_the_equations_see_something_else(
-    own: float, named: bool
+    own: float, named: bool, missed: dict[str, Any]
 ) -> None:
     """A stop beside a sensor whose error fills them; ``own`` of what is left without it is left with it."""
-    one = replace(SURE, missing=(15.0, 11.0), own=own, ceiling=own)
-    assert (credit(one, FAR, CONSTANTS) > 0.5) is named
+    one = replace(SURE, own=own, ceiling=own, **missed)
+    assert (credit(one, replace(FAR, kept=1.0), CONSTANTS) > 0.5) is named
 
 
 def test_what_others_miss_is_no_reason_against_what_has_mended_its_own_equations() -> None:
     others = replace(FAR, kept=0.98)
-    assert credit(SURE, others, CONSTANTS) < 0.4
-    assert credit(replace(SURE, mended=0.05), others, CONSTANTS) > 0.99
+    assert credit(SLIGHT, others, CONSTANTS) < 0.4
+    assert credit(replace(SLIGHT, mended=0.05), others, CONSTANTS) > 0.99
 
 
 def test_a_certain_credit_is_told_as_often_as_such_were_right_and_a_half_stays_a_half() -> None:

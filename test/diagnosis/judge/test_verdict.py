@@ -177,11 +177,12 @@ def test_traces_that_every_rig_has_are_nothing(gap: float, verdict: str) -> None
 
 
 def test_no_small_name_stands_beside_something_larger_without_one() -> None:
-    """At the same place; elsewhere it does."""
+    """At the same place and evidently larger; elsewhere it does."""
     refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "bump_stop", unknowns=36)
     good, bent = evidence(pair, 1.0, 0.1, 0.1)[0], evidence(pair, 1.0, 0.1, 0.1, at_bounds=2.0)[1]
     for share, place, verdict in (
         (0.9, "front_force", "unknown"),
+        (0.45, "front_force", "leak"),
         (0.9, "rear_air", "leak"),
         (0.1, "front_force", "leak"),
     ):
