@@ -32,7 +32,7 @@ from pneumo_ros.diagnosis.search.selection import (
     select,
 )
 from pneumo_ros.diagnosis.search.state import Search
-from pneumo_ros.effects.parameters import family_of
+from pneumo_ros.effects.parameters import Active, family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
@@ -48,6 +48,10 @@ PASSES: Final = 2  # over the effects of the best structure, exchanging each; th
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 CLOSE: Final = 12.0  # log weight that a structure of other families may be behind to be fitted to the end [numerics]
 ENDED: Final = 3  # structures of as many effects that are fitted to the end [numerics]
+# Share (rms) of what the refit leaves, above which a structure leaves most of it: then singles are looked for by their
+# families' shapes [taste]
+HALF: Final = 0.5
+BY_SHAPES: Final = (9, 3)  # places whose best is fitted shortly, and of these to the end [numerics]
 IDLE: Final = 0.02  # mean square, sigma squared, that a shape may close without being missed [taste]
 
 
@@ -56,6 +60,9 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     search.progress(0.82, "shapes")
     search.structures += shaped(search.problem, search.pairs[:SHAPED])
     best = _selected(search, limits)
+    if _unexplained(search, best) and room_for_more(search):
+        search.structures += _by_shapes(search)
+        best = _selected(search, limits)
     if further and best.size and room_for_more(search):
         _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
         best = _selected(search, limits)
@@ -68,6 +75,30 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
+
+
+def _unexplained(search: Search, best: Scored) -> bool:
+    """Whether no pair was found and the best single leaves most of what the refit leaves, and that is much."""
+    most = best.level > HALF**2 * score(search.problem, search.refit).level
+    return best.size < 2 and most and _much_left(search, best)
+
+
+def _by_shapes(search: Search) -> list[Fit]:
+    """Single effects as their families' shapes find them at the refit, the best families.
+
+    The screening of singles sees the library's laws at a few values. Where none of them explains anything, a law that
+    is far from all of these may still lie in its family's shape: a tank that a long run empties. Each place's best is
+    tried.
+    """
+    problem, effort = search.problem, search.effort
+    search.progress(0.83, "every family by its shape")
+    base = refreshed(problem, search.refit)
+    ranked = probed(problem, base, [_with_shape(problem, one) for one in search.screened])
+    of_place: dict[str, CandidateScore] = {}
+    for one in ranked:  # probes are short: what a place's best family comes to, a fit shows
+        of_place.setdefault(problem.model.places(Active(*one.parts[0], ()))[0], one)
+    short = short_fits(search, base, list(of_place.values())[: BY_SHAPES[0]], (0.83, 0.84))[: BY_SHAPES[1]]
+    return problem.each(lambda one: fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long), short)
 
 
 def _climb(search: Search, start: Scored, evident: float) -> None:

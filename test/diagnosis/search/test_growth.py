@@ -145,6 +145,20 @@ def test_a_further_effect_is_probed_with_its_shape() -> None:
     assert law[0] == "gauge" and found.candidate.shapes == (("gauge.shape", law[1]),)
 
 
+def test_where_no_law_explains_anything_each_family_is_tried_by_its_shape() -> None:
+    """Three other laws close a hair more than the right family's, and all of them next to nothing."""
+    size = _effects()["a"].parameters
+    sites = {"a": "", "d": "", "scale": "right", "gauge": "left", "gauge.shape": "left"}
+    effects = {name: PlainEffect(name, (site,), size) for name, site in sites.items()}
+    problem = Problem(Sided(effects=effects), (made({"b": 1.0, "a": 0.06, "d": 0.06}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    assert all(one.candidate.laws[0][0] != "gauge" for one in search.finalists if one.candidate.shapes)
+    grow(search, Thresholds())
+    refit, *others = (score(search.problem, one) for one in (search.refit, *search.finalists))
+    chosen = select(refit, others, Thresholds())
+    assert ("gauge", "left") in chosen.fit.candidate.laws and chosen.level < 0.01 * refit.level
+
+
 def test_what_takes_an_effects_place_is_probed_with_its_shape() -> None:
     size = _effects()["a"].parameters
     sites = {"a": "", "d": "", "scale": "left", "gauge": "left", "gauge.shape": "left"}
