@@ -47,6 +47,9 @@ Fitted = tuple[Array, tuple[Active, ...]]  # nuisance values and effects of a st
 Locate = Callable[[Any, Sequence[Any], Any, Fitted | None, int], tuple[Whereabouts, Whereabouts | None]]
 # (model, fit logs, held-out log) -> the rig's equations along the held-out one
 HoldEquations = Callable[[Any, Sequence[Any], Any], Equations]
+# (model, held-out log, tolerances of the refit) -> places at which some input, of any time course, explains what that
+# leaves, with the share each closes, the likeliest first
+FindInputs = Callable[[Any, Any, Array], Sequence[tuple[str, float]]]
 LIKELY: Final = 0.05  # share of a place from which a remainder is looked for there [taste]
 SEEN: Final = 0.3  # sigmas, rms: below it the typical size of an effect does not show in a log [taste]
 # Share of the library that the excitation cannot show, above which "none" would say nothing [taste]
@@ -68,6 +71,7 @@ class Options:
     calibration : constants of the probabilities
     locate : places of what structures leave, see :data:`Locate`
     equations : what structures leave in the rig's equations, see :data:`HoldEquations`
+    inputs : where something acts that no shape follows, see :data:`FindInputs`
     experiment : design the experiment that splits an ambiguity group
     threads : simulations at a time
     """
@@ -78,6 +82,7 @@ class Options:
     calibration: Calibration = field(default_factory=Calibration)
     locate: Locate | None = None
     equations: HoldEquations | None = None
+    inputs: FindInputs | None = None
     experiment: Callable[[Problem, Fit, Fit], NextExperiment | None] | None = None
     threads: int = 1
 
@@ -222,7 +227,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
     tell(0.95, "ranking")
     ranking = rank(outcome, opinion)
     group = ambiguity_group(problem, opinion, outcome.refit, outcome.finalists)
-    location = _location(outcome, opinion)
+    location = _location(outcome, opinion, options.inputs)
     experiment = None
     if options.experiment is not None and opinion.verdict != "unknown" and set(group) - {opinion.verdict}:
         tell(0.97, "designing the next experiment")
@@ -292,9 +297,10 @@ def _whereabouts(outcome: Outcome, locate: Locate | None) -> tuple[Whereabouts |
     return before, before if fitted is None else after
 
 
-def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
-    """A named effect's own places; else those where something in a name's stead left less, before the places where a
-    flexible correction of the nominal model helps.
+def _location(outcome: Outcome, opinion: Opinion, inputs: FindInputs | None) -> list[tuple[str, float]]:
+    """A named effect's own places. Else the places of inputs that explain what the refit leaves; of two effects and
+    more these would be one that does the work of all, and then those where something in a name's stead left less come
+    first, before the places where a flexible correction of the nominal model helps.
 
     Not of the best named structure: a wrong name has changed the model where it acts.
     """
@@ -303,6 +309,10 @@ def _location(outcome: Outcome, opinion: Opinion) -> list[tuple[str, float]]:
         initial = settle(model, holdout, outcome.nuisance, outcome.active)
         closed = max(0.0, 1.0 - runs["best"].total / runs["refit"].total)
         return effect_shares(model, holdout, outcome.nuisance, initial, outcome.active, closed)
+    if inputs is not None and outcome.chosen.size < 2 and opinion.verdict == "unknown":
+        found = inputs(model, holdout, outcome.problem.nuisance(outcome.base.x))
+        if found:
+            return list(found)
     before = () if outcome.before is None else outcome.before.shares
     floor = total_floor(holdout)
     first = outcome.closable.in_stead(runs["refit"].total ** 2 - floor**2)

@@ -14,7 +14,14 @@ from pneumo_ros.diagnosis.diagnose import Fitted, Options, diagnose, split_by_ti
 from pneumo_ros.diagnosis.fit.together import each
 from pneumo_ros.diagnosis.half_car.signals import Signals, check_pair, read_signals
 from pneumo_ros.diagnosis.half_car.signals.wiring import check_wiring
-from pneumo_ros.diagnosis.half_car.where import Location, Start, flexible_gain, held_equations, locate
+from pneumo_ros.diagnosis.half_car.where import (
+    Location,
+    Start,
+    flexible_gain,
+    held_equations,
+    latent_places,
+    locate,
+)
 from pneumo_ros.diagnosis.judge.equations import Equations
 from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
@@ -43,6 +50,8 @@ class Task:
             chosen = replace(chosen, locate=flexible_search)
         if chosen.equations is None:
             chosen = replace(chosen, equations=left_in_equations)
+        if chosen.inputs is None:
+            chosen = replace(chosen, inputs=latent_places)
         found = diagnose(self.model, self.fit, self.holdout, chosen, progress, self.edit)
         return replace(found, notes=(*self.notes, *found.notes))
 

@@ -8,6 +8,7 @@ from pneumo_ros.diagnosis.half_car.where.gain import FlexibleGain as FlexibleGai
 from pneumo_ros.diagnosis.half_car.where.gain import flexible_gain as flexible_gain
 from pneumo_ros.diagnosis.half_car.where.held_equations import HeldEquations as HeldEquations
 from pneumo_ros.diagnosis.half_car.where.held_equations import held_equations as held_equations
+from pneumo_ros.diagnosis.half_car.where.latent import latent_places as latent_places
 from pneumo_ros.diagnosis.half_car.where.law import Law as Law
 from pneumo_ros.diagnosis.half_car.where.law import missing_law as missing_law
 from pneumo_ros.diagnosis.half_car.where.locate import Location as Location
