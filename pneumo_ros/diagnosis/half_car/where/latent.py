@@ -29,6 +29,7 @@ from pneumo_ros.effects.rig_model import RigModel
 
 KNOTS: Final = 0.1  # s between knots of the cubic splines: they follow what moves at up to some 4 Hz [numerics]
 ROWS: Final = 0.02  # s between rows that are compared [numerics]
+LONGEST: Final = 20.0  # s of a log that are looked at: time and memory grow with the square [numerics]
 # Prior variances of a time course that are tried, its response's mean square over that of the noise [numerics]
 VARIANCES: Final = tuple(float(v) for v in np.geomspace(1e-2, 1e6, 33))
 # Forward differences: m, m/s and Pa of the state, N, Pa/s, N m and Pa of the corrections [numerics]
@@ -96,6 +97,7 @@ def latent_places(model: RigModel, record: Signals, nuisance: Array) -> tuple[tu
     """
     if model.configured:  # the linearised step would begin their memories anew
         return ()
+    record = _loudest(model, record, nuisance)
     states = model.states(record, nuisance, settle(model, record, nuisance, ()))
     if not np.all(np.isfinite(states)):
         return ()
@@ -114,6 +116,18 @@ def latent_places(model: RigModel, record: Signals, nuisance: Array) -> tuple[tu
         out += _shared(told, left, {place: share for place, (_, share) in tried.items()})
         inputs, left = (*inputs, *places[told]), tried[told][1]
     return tuple(out)
+
+
+def _loudest(model: RigModel, record: Signals, nuisance: Array) -> Signals:
+    """The :data:`LONGEST` part of a log of which the free run leaves most, a log of its own; a shorter log whole."""
+    count, every = round(LONGEST / record.period), round(1.0 / record.period)
+    if len(record.measured) <= count:
+        return record
+    left = record.measured - model.predict(record, nuisance, settle(model, record, nuisance, ()))
+    squares = np.nansum((left * record.weight / record.noise) ** 2, axis=1)
+    starts = range(0, len(squares) - count + 1, every)
+    first = max(starts, key=lambda start: float(squares[start : start + count].sum()))
+    return record.slice(first, first + count)
 
 
 def _shared(told: tuple[str, ...], left: float, tried: Mapping[tuple[str, ...], float]) -> list[tuple[str, float]]:

@@ -15,9 +15,11 @@ from pneumo_ros.diagnosis.half_car.signals import Signals
 from pneumo_ros.diagnosis.half_car.where.latent import (
     BODY,
     INPUTS,
+    LONGEST,
     VARIANCES,
     Courses,
     _linearised,
+    _loudest,
     _responses,
     latent_places,
 )
@@ -88,6 +90,16 @@ def test_two_inputs_that_no_single_place_explains_are_both_told(model: RigModel,
     measured[:, model.channels.index("unsprung_rear")] += 2e-4 * tones(log)[::-1]
     found = latent_places(model, replace(log, measured=measured), nominal(model))
     assert {place for place, _ in found} == {"front_air", "sensor:unsprung_rear"}
+
+
+def test_of_a_long_log_the_part_is_looked_at_that_shows_most(model: RigModel) -> None:
+    clean, road, commands = simulated(1.5 * LONGEST, SEED)
+    whole = signals_of(clean, road, commands, SEED)
+    late = np.arange(len(clean)) > 0.75 * len(clean)
+    moved = driven(model, whole, "rear_force").measured - whole.measured
+    part = _loudest(model, replace(whole, measured=whole.measured + late[:, None] * moved), nominal(model))
+    assert len(part.measured) * part.period == pytest.approx(LONGEST)
+    assert part.start == pytest.approx(whole.start + 0.5 * LONGEST, abs=1.0)
 
 
 def test_tolerances_answer_first(model: RigModel, log: Signals) -> None:
