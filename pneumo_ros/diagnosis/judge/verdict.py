@@ -55,11 +55,19 @@ class Calibration:
         and of none that holds more of the run (mean square) than is left of it in all
     unheld : share of what the equations miss without an effect that they may miss with it to say nothing, and to be as
         likely something else, with the same exception
+    lost : share (rms) by which the structure closes more of the refit's gap in the fitted logs' kept blocks than in the
+        held-out log, at which an effect is as likely something else: a law of the rig explains the next log as well;
+        with the same exception
     varied : share of what an effect's law is a function of that its sign does not explain, at which it is as likely
         something that knows the sign alone: dry friction and damping draw one picture at one speed
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
     bent : share (rms, above the floor) that a structure leaves of the refit's gap from which on those that bend a shape
         count in full: a law that nobody wrote bends it and leaves little, something else leaves more
+    split : times what a sensor's error holds that an effect anywhere must hold for the error to be no likelier than it,
+        unless the equations miss twice as much without the error: one unknown motion is split between the two as it
+        comes
+    rest : times what an effect holds that one at another place must hold for that, with the same exception: a wrong
+        name leaves a third (rms) of what it stands for, and others fit that rest
     traces : what the refit leaves beyond the noise floor, in floors, at which it is as likely the work of traces that
         every rig has, and of a floor that is known to a few per cent
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
@@ -86,6 +94,9 @@ class Calibration:
     instead: float = 2.0
     kept: float = 0.8
     unheld: tuple[float, float] = (0.8, 0.95)
+    lost: float = 0.6
+    split: float = 0.5
+    rest: float = 10.0
     traces: float = 0.4
     held_real: float = 3.0
     right: float = 0.94
@@ -116,6 +127,11 @@ class HeldOutGaps:
     def within_form(self) -> bool:
         """Whether a model form is stated or assumed and the refit leaves no more than it: nothing is missed."""
         return self.form > 0.0 and self.refit <= 1.0
+
+    @property
+    def closed(self) -> float:
+        """Share (rms, above the floor) of the refit's gap that the structure closes, 1 at most."""
+        return 1.0 - beyond(self.chosen, 1.0) / max(beyond(self.refit, 1.0), 1e-9)
 
 
 @dataclass(frozen=True)
@@ -176,7 +192,9 @@ def judge(
         scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
     worse = held.chosen >= held.refit or held.within_form
-    trust = _beside_unnamed({one.law: 0.0 if worse else credit(one, held, calibration) for one in evidence}, evidence)
+    fitted = 1.0 - float(np.sqrt(chosen.level / max(refit.level, 1e-12)))
+    credits = {one.law: 0.0 if worse else credit(one, held, calibration, fitted) for one in evidence}
+    trust = _beside_unnamed(credits, evidence, calibration)
     trusted = max(trust.values(), default=0.0)
     unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)
     scaled = {candidate: p * trusted for candidate, p in named.items()}
@@ -190,34 +208,53 @@ def judge(
     return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 
 
-def _beside_unnamed(trust: Mapping[Part, float], evidence: Sequence[EffectEvidence]) -> dict[Part, float]:
-    """Probability of each effect, at most that of every evidently larger one that is blamed on the same place.
+def _beside_unnamed(
+    trust: Mapping[Part, float], evidence: Sequence[EffectEvidence], calibration: Calibration
+) -> dict[Part, float]:
+    """Probability of each effect, at most that of every one that it may be a remainder or a part of.
 
-    Where the larger one at a place is probably misnamed, the smaller one may be a remainder of it; of two that hold as
-    much neither is. A sensor's error is bounded by larger effects at any place, because what moves the rig can look
-    like one. Effects that the held-out log does not miss, above noise and model form, bound nothing."""
+    Effects that the held-out log does not miss, above noise and model form, bound nothing."""
+    missed = [one for one in evidence if one.without > 0.0]
     out = dict(trust)
     for one in evidence:
-        sensor = one.places[0].startswith(SENSOR)
-        beside = [e for e in evidence if sensor or e.places[:1] == one.places[:1]]
-        larger = [e.law for e in beside if e.share > LARGER * one.share and e.without > 0.0]
-        out[one.law] = min([trust[one.law], *(trust[law] for law in larger)])
+        bounds = (trust[other.law] for other in missed if _bounds(other, one, calibration))
+        out[one.law] = min([trust[one.law], *bounds])
     return out
 
 
-def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration) -> float:
-    """Probability that an effect of the structure is what acts at its place, 0..1."""
+def _bounds(other: EffectEvidence, one: EffectEvidence, calibration: Calibration) -> bool:
+    """Whether the one is no more probable than the other, by what they hold of what the refit leaves.
+
+    Where the larger one at a place is probably misnamed, the smaller one may be a remainder of it; of two that hold as
+    much neither is. What moves the rig can look like a sensor's error, so that is bounded from any place, and by what
+    is comparable, for one unknown motion is split between the two as it comes. Beside what holds nearly everything and
+    cannot be named nothing is, wherever it acts. The rig's equations tell place from place, and sensors from forces:
+    what they hold up is bounded by larger ones at its place alone, a sensor's error from any."""
+    sensor, held_up = one.places[0].startswith(SENSOR), one.held_up > 1.0
+    if sensor and not held_up:
+        return other.share > calibration.split * one.share
+    if sensor or other.places[:1] == one.places[:1]:
+        return other.share > LARGER * one.share
+    return not held_up and min(other.share, 1.0) > calibration.rest * one.share
+
+
+def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration, fitted: float = 0.0) -> float:
+    """Probability that an effect of the structure is what acts at its place, 0..1.
+
+    ``fitted`` : share (rms) of what the refit leaves of the fitted logs' kept blocks that the structure closes; 0 where
+    nobody looked
+    """
     c = calibration
-    closed = 1.0 - beyond(held.chosen, 1.0) / max(beyond(held.refit, 1.0), 1e-9)
-    stuck = one.at_bounds + one.bent * min(1.0, (1.0 - closed) / c.bent)
+    stuck = one.at_bounds + one.bent * min(1.0, (1.0 - held.closed) / c.bent)
     left_over_held = one.own / max(one.without - one.own, 1e-12)
     against = [(1.0 - one.closes) / (1.0 - c.closes), max(0.0, one.leaves - 1.0) / (c.leaves - 1.0),
                stuck / c.at_bounds, c.varied / max(one.varied, 1e-9), c.least / max(one.share, 1e-9),
-               min(c.slight / max(closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
+               min(c.slight / max(held.closed, 1e-9), 1.0 / max(one.held_up, 1e-9)),
                min(c.beside / max(one.beside, 1e-9), (c.instead - 1.0) / max(one.instead - 1.0, 1e-9)),
                c.traces / max(beyond(held.refit, 1.0), 1e-9),
                min(held.kept / c.kept, one.mended / c.kept, left_over_held),
-               min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), left_over_held)]  # fmt: skip
+               min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), left_over_held),
+               min(max(0.0, fitted - held.closed) / c.lost, left_over_held)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
     # the run or, where that is led astray by what is left, in the rig's equations.
     if one.places[0].startswith(SENSOR):

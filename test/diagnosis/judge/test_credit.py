@@ -81,6 +81,18 @@ def test_what_holds_more_of_the_run_than_is_left_stands_where_the_equations_see_
     assert (credit(one, replace(FAR, kept=1.0), CONSTANTS) > 0.5) is named
 
 
+@pytest.mark.parametrize("own, named", [(0.45, True), (0.6, False)])
+def test_what_explains_the_fitted_logs_and_not_the_next_is_something_else(own: float, named: bool) -> None:
+    """All of the fitted logs and a fifth of the held-out one; what holds more of that than is left there stands."""
+    held = HeldOutGaps(1e6, 0.8e6)
+    one = replace(SURE, own=own, ceiling=own)
+    assert credit(one, held, CONSTANTS) > 0.8
+    assert (credit(one, held, CONSTANTS, fitted=1.0) > 0.5) is named
+    for k in (0.8, 1.0, 1.2):
+        likely = credit(SLIGHT, held, CONSTANTS, 0.2 + k * CONSTANTS.lost)
+        assert likely == pytest.approx(1.0 / (1.0 + k**CONSTANTS.steepness), abs=1e-4)
+
+
 def test_what_others_miss_is_no_reason_against_what_has_mended_its_own_equations() -> None:
     others = replace(FAR, kept=0.98)
     assert credit(SLIGHT, others, CONSTANTS) < 0.4

@@ -194,6 +194,51 @@ def test_no_small_name_stands_beside_something_larger_without_one() -> None:
     assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), [sensor, elsewhere]).verdict == "unknown"
 
 
+@pytest.mark.parametrize(
+    ("place", "share", "missing", "named"),
+    [
+        ("sensor:sprung_front", 0.6, None, False),  # one unknown motion is split between the two as it comes
+        ("sensor:sprung_front", 1.0, None, True),  # what is refused holds less than half as much
+        ("sensor:sprung_front", 0.6, (20.0, 2000.0), True),  # the rig's equations tell a sensor from a force
+        ("sensor:sprung_front", 0.3, (20.0, 2000.0), False),  # evidently smaller
+        ("front_force", 0.6, None, True),
+        ("front_force", 0.03, None, False),  # what is refused holds nearly everything, this fits what it leaves
+        ("front_force", 0.05, None, True),
+        ("front_force", 0.03, (20.0, 2000.0), True),  # and tell place from place
+    ],
+)
+def test_what_is_small_beside_something_elsewhere_without_a_name(
+    place: str, share: float, missing: tuple[float, float] | None, named: bool
+) -> None:
+    refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "lvdt_scale", "hysteresis", unknowns=36)
+    good, bent = evidence(pair, 1.0, 0.1, 0.1)[0], evidence(pair, 1.0, 0.1, 0.1, at_bounds=2.0)[1]
+    effects = [replace(good, share=share, places=(place,), missing=missing),
+               replace(bent, share=0.4, places=("rear_air",))]  # fmt: skip
+    told = judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects)
+    assert told.verdict == ("lvdt_scale" if named else "unknown")
+
+
+def test_nobody_holds_more_than_all() -> None:
+    """What runs away without the one that is refused says nothing of what the other holds."""
+    refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "resonance", "hysteresis", unknowns=36)
+    good, bent = evidence(pair, 1.0, 0.1, 0.1)[0], evidence(pair, 1.0, 0.1, 0.1, at_bounds=2.0)[1]
+    for share, verdict in ((0.2, "resonance"), (0.05, "unknown")):
+        effects = [replace(good, share=share), replace(bent, share=1e16, places=("rear_air",))]
+        assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("level", "left", "verdict"), [(0.6, 16.0, "unknown"), (200.0, 16.0, "heat"), (0.6, 6.0, "heat")]
+)
+def test_a_law_that_explains_the_fitted_log_and_not_the_next_is_unknown(
+    level: float, left: float, verdict: str
+) -> None:
+    """A chamber that leaks is warm air to a library without leaks, at a size of its own in each log."""
+    refit, chosen = scored(400.0, 3000.0), scored(level, -500.0, "heat", unknowns=33)
+    (one,) = evidence(chosen, 1.0, left / 20.0, left / 20.0)
+    assert judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, left), [one]).verdict == verdict
+
+
 @pytest.mark.parametrize(("left", "named"), [(1.5, True), (9.0, False)])
 def test_what_bends_a_shape_counts_the_more_the_more_is_left(left: float, named: bool) -> None:
     refit, chosen = scored(400.0, 3000.0), scored(0.6, -500.0, "bellows_mode", unknowns=36)
