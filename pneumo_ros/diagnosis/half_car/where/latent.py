@@ -5,9 +5,8 @@ The equations along the measured motion (:mod:`pneumo_ros.diagnosis.half_car.whe
 it is larger than their noise in one window; a free run adds up what a newton of wind does in seconds. So each place
 may add any smooth time course to the refit's free run along the held-out log, linearised about it, and the places are
 compared by the evidence for such an input: a Gaussian process whose variance is chosen by maximum marginal likelihood
-(latent force models: Alvarez, Luengo, Lawrence 2013, IEEE TPAMI 35, 2693-2705; Rogers and Friis 2022, Mechanical
-Systems and Signal Processing 174, 109095). A sensor's error is such a time course of its own channel. The tolerances
-and the first state answer first.
+(latent force models: Alvarez, Luengo, Lawrence 2013, IEEE TPAMI 35, 2693-2705; Rogers and Friis, arXiv 2109.10681).
+A sensor's error is such a time course of its own channel. The tolerances and the first state answer first.
 """
 
 from __future__ import annotations
