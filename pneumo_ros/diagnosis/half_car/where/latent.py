@@ -26,7 +26,7 @@ from pneumo_ros.diagnosis.search.screening import SENSOR
 from pneumo_ros.effects.composition import CORRECTIONS
 from pneumo_ros.effects.rig_model import RigModel
 
-KNOTS: Final = 0.1  # s between knots of the cubic splines: they follow what moves at up to some 4 Hz [numerics]
+KNOTS: Final = 0.05  # s between knots of the cubic splines: they follow what moves at up to some 9 Hz [numerics]
 ROWS: Final = 0.02  # s between rows that are compared [numerics]
 LONGEST: Final = 20.0  # s of a log that are looked at: time and memory grow with the square [numerics]
 # Prior variances of a time course that are tried, its response's mean square over that of the noise [numerics]
@@ -38,12 +38,17 @@ INPUT_STEPS: Final = (1.0, 1.0, 1e4, 1e4, 1.0, 1.0, 1.0, 0.1, 100.0)
 PARAMETER_STEP: Final = 0.1  # standard deviations [numerics]
 # Share of the whole, and of what is left, that a further place must close to be told [taste]
 FURTHER: Final = (0.1, 0.5)
-MOST: Final = 3  # places, the body's two as one [taste]
+MOST: Final = 3  # places, two that one thing moves as one [taste]
+CLOSED: Final = 0.5  # share of the whole that they must close: what is quicker than the splines is not seen [numerics]
 BODY: Final = ("body_heave", "body_pitch")
+STRUTS: Final = ("front_force", "rear_force")
+AIRS: Final = ("front_air", "rear_air")
 # A place of the contract, or several that one thing moves -> the inputs that it drives [definition]
 INPUTS: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
     **{(name,): (name,) for name in CORRECTIONS},
     BODY: BODY,
+    STRUTS: STRUTS,
+    AIRS: AIRS,
     ("road_input",): ("front_tyre", "rear_tyre"),  # a road that is off pushes both axles
 }
 
@@ -54,24 +59,33 @@ class Courses:
 
     Attributes
     ----------
-    rows_of : input, or place of a sensor, -> its rows of ``gram`` and ``seen``
-    gram : (M, M) products of what the splines of all inputs do to the outputs, in sigmas, each input's rms about one
-    seen : (M,) their products with the residual
-    whole : sum of squares of the residual, sigma squared
+    parts : input, or place of a sensor, -> its columns
+    columns : (n, M) what the splines of all inputs do to the outputs, in sigmas, each input's rms about one
+    residual : (n,) what the run leaves, in sigmas
+    answered : (A, M + 1) of columns and residual what tolerances and first state answer: products are those of the
+        columns less those of these
     """
 
-    rows_of: Mapping[str, slice]
-    gram: Array
-    seen: Array
-    whole: float
+    parts: Mapping[str, slice]
+    columns: Array
+    residual: Array
+    answered: Array
+
+    @property
+    def whole(self) -> float:
+        """Sum of squares of the residual, sigma squared."""
+        own = self.answered[:, -1]
+        return float(self.residual @ self.residual - own @ own)
 
     def evidence(self, inputs: Sequence[str]) -> tuple[float, float]:
         """Gain of the log marginal likelihood over no input, at the best variance, and the share of the residual's
         squares that is left there.
         """
-        some = np.concatenate([np.arange(len(self.seen))[self.rows_of[name]] for name in inputs])
-        values, vectors = np.linalg.eigh(self.gram[np.ix_(some, some)])
-        values, seen = np.maximum(values, 0.0), vectors.T @ self.seen[some]
+        D, A = (np.concatenate([of[:, self.parts[name]] for name in inputs], axis=1)
+                for of in (self.columns, self.answered))  # fmt: skip
+        values, vectors = np.linalg.eigh(D.T @ D - A.T @ A)
+        product = D.T @ self.residual - A.T @ self.answered[:, -1]
+        values, seen = np.maximum(values, 0.0), vectors.T @ product
         best = (-np.inf, 1.0)
         for v in VARIANCES:
             shrunk = v / (1.0 + v * values)
@@ -83,10 +97,11 @@ class Courses:
 
 def latent_places(model: RigModel, record: Signals, nuisance: Array) -> tuple[tuple[str, float], ...]:
     """Places whose free time courses explain what the free run leaves of a log, with the share of its squares that each
-    closes, in the order found; empty where the run has no end or the rig's configuration holds effects.
+    closes, in the order found; empty where they close less than :data:`CLOSED`, where the run has no end, or where the
+    rig's configuration holds effects.
 
-    The first is the one of largest evidence, the body's heave and pitch together counting as one; a further one is told
-    where it closes :data:`FURTHER`.
+    The first is the one of largest evidence; the body's heave and pitch, both struts, or the air of both springs count
+    as one. A further one is told where it closes :data:`FURTHER`.
 
     Parameters
     ----------
@@ -102,7 +117,7 @@ def latent_places(model: RigModel, record: Signals, nuisance: Array) -> tuple[tu
         return ()
     found = _courses(model, record, nuisance, states)
     places = dict(INPUTS)
-    places |= {(name,): (name,) for name in found.rows_of if name not in CORRECTIONS}
+    places |= {(name,): (name,) for name in found.parts if name not in CORRECTIONS}
     out: list[tuple[str, float]] = []
     inputs: tuple[str, ...] = ()
     left = 1.0
@@ -114,7 +129,7 @@ def latent_places(model: RigModel, record: Signals, nuisance: Array) -> tuple[tu
             break
         out += _shared(told, left, {place: share for place, (_, share) in tried.items()})
         inputs, left = (*inputs, *places[told]), tried[told][1]
-    return tuple(out)
+    return tuple(out) if left < 1.0 - CLOSED else ()
 
 
 def _loudest(model: RigModel, record: Signals, nuisance: Array) -> Signals:
@@ -130,8 +145,8 @@ def _loudest(model: RigModel, record: Signals, nuisance: Array) -> Signals:
 
 
 def _shared(told: tuple[str, ...], left: float, tried: Mapping[tuple[str, ...], float]) -> list[tuple[str, float]]:
-    """What a place closes of the share that was left; of the body's two each one's part, averaged over both orders, the
-    larger first.
+    """What a place closes of the share that was left; of two that count as one each one's part, averaged over both
+    orders, the larger first.
 
     ``tried`` : place -> share that is left with it"""
     closed = left - tried[told]
@@ -157,24 +172,24 @@ def _courses(model: RigModel, record: Signals, nuisance: Array, states: Array) -
     splines = _splines(len(rows), every * record.period)
     step, held = _linearised(model, record, nuisance, states[rows], every)
     shows, none = _shown(model, states[0]), np.zeros(STATES)
-    columns = {}
+    names = (*CORRECTIONS, *(f"{SENSOR}{name}" for name in model.channels))
+    count = splines.shape[1]
+    parts = {name: slice(k * count, (k + 1) * count) for k, name in enumerate(names)}
+    columns = np.empty((len(residual), count * len(names)))  # filled one by one: together they are what memory holds
     for k, name in enumerate(CORRECTIONS):
-        moved = _responses(step, held[:, :, k, None] * splines[:-1, None, :], none)
-        columns[name] = weighed(shows @ moved)
-    for k, name in enumerate(model.channels):
-        columns[f"{SENSOR}{name}"] = weighed(np.eye(len(model.channels))[k][None, :, None] * splines[:, None, :])
-    scaled = [one / max(float(np.sqrt(np.mean(np.sum(one**2, axis=0)))), 1e-300) for one in columns.values()]
+        columns[:, parts[name]] = weighed(shows @ _responses(step, held[:, :, k, None] * splines[:-1, None, :], none))
+    for k, channel in enumerate(model.channels):
+        own = np.eye(len(model.channels))[k][None, :, None] * splines[:, None, :]
+        columns[:, parts[f"{SENSOR}{channel}"]] = weighed(own)
+    for part in parts.values():
+        columns[:, part] /= max(float(np.sqrt(np.mean(np.sum(columns[:, part] ** 2, axis=0)))), 1e-300)
     free = INITIAL_WIDENING * np.diag(model.initial(record, ())[1])
     first = shows @ _responses(step, np.zeros((len(step), STATES, STATES)), free)
     answers = weighed(np.concatenate([first, _by_tolerances(model, record, nuisance, states[0])[rows]], axis=2))
     # Their prior is the unit normal: the residual's covariance without an input is I + A A', inverted by Woodbury.
     root = np.linalg.cholesky(np.eye(answers.shape[1]) + answers.T @ answers)
-    D = np.concatenate(scaled, axis=1)
-    part, own = (np.linalg.solve(root, answers.T @ one) for one in (D, residual))
-    ends = np.cumsum([0, *(one.shape[1] for one in scaled)])
-    rows_of = {name: slice(ends[k], ends[k + 1]) for k, name in enumerate(columns)}
-    return Courses(rows_of, D.T @ D - part.T @ part, D.T @ residual - part.T @ own,
-                   float(residual @ residual - own @ own))  # fmt: skip
+    products = np.column_stack([answers.T @ columns, answers.T @ residual])
+    return Courses(parts, columns, residual, np.linalg.solve(root, products))
 
 
 def _splines(count: int, period: float) -> Array:

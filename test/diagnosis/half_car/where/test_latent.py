@@ -18,6 +18,7 @@ from pneumo_ros.diagnosis.half_car.where.latent import (
     LONGEST,
     VARIANCES,
     Courses,
+    _courses,
     _linearised,
     _loudest,
     _responses,
@@ -89,7 +90,7 @@ def test_two_inputs_that_no_single_place_explains_are_both_told(model: RigModel,
     measured = driven(model, log, "front_air").measured
     measured[:, model.channels.index("unsprung_rear")] += 2e-4 * tones(log)[::-1]
     found = latent_places(model, replace(log, measured=measured), nominal(model))
-    assert {place for place, _ in found} == {"front_air", "sensor:unsprung_rear"}
+    assert {place for place, share in found if share > 0.1} == {"front_air", "sensor:unsprung_rear"}
 
 
 def test_of_a_long_log_the_part_is_looked_at_that_shows_most(model: RigModel) -> None:
@@ -103,12 +104,12 @@ def test_of_a_long_log_the_part_is_looked_at_that_shows_most(model: RigModel) ->
 
 
 def test_tolerances_answer_first(model: RigModel, log: Signals) -> None:
-    """A rig one sigma from nominal leaves nothing that an input had to explain."""
-    off = np.array([p.nominal + (-1.0) ** k * p.std for k, p in enumerate(model.parameters)])
+    """Of what a rig half a sigma from nominal leaves next to nothing is left for inputs."""
+    off = np.array([p.nominal + 0.5 * (-1.0) ** k * p.std for k, p in enumerate(model.parameters)])
     other = replace(log, measured=log.measured + model.simulate(log, off) - model.simulate(log))
-    alone, mixed = (sum(share for _, share in latent_places(model, one, nominal(model)))
-                    for one in (driven(model, log, "front_force"), other))  # fmt: skip
-    assert alone > 0.95 and mixed < 0.8
+    states = model.states(other, nominal(model), model.initial(other)[0])
+    found = _courses(model, other, nominal(model), states)
+    assert 0.0 < found.whole < 0.02 * float(found.residual @ found.residual)
 
 
 def test_the_step_is_linearised_about_the_run(model: RigModel, log: Signals) -> None:
@@ -131,7 +132,7 @@ def test_the_step_is_linearised_about_the_run(model: RigModel, log: Signals) -> 
 def test_the_evidence_is_the_marginal_likelihood() -> None:
     rng = np.random.default_rng(5)
     D, y = rng.normal(size=(40, 3)), 3.0 * rng.normal(size=40)
-    found = Courses({"a": slice(0, 3)}, D.T @ D, D.T @ y, float(y @ y))
+    found = Courses({"a": slice(0, 3)}, D, y, np.zeros((1, 4)))
     white = multivariate_normal(np.zeros(40), np.eye(40)).logpdf(y)
     gains = [multivariate_normal(np.zeros(40), np.eye(40) + v * D @ D.T).logpdf(y) - white for v in VARIANCES]
     gain, left = found.evidence(["a"])
@@ -147,6 +148,12 @@ def test_it_says_nothing_where_the_rig_file_holds_effects_or_the_run_has_no_end(
     assert latent_places(holding, log, nominal(model)) == ()
     wild = replace(log, road=np.where(np.arange(len(log.road))[:, None] > 100, 1e6, log.road))
     assert latent_places(model, wild, nominal(model)) == ()
+
+
+def test_what_is_quicker_than_the_splines_is_not_told(model: RigModel, log: Signals) -> None:
+    measured = log.measured.copy()
+    measured[:, 0] += 1e-3 * np.sin(2.0 * np.pi * 60.0 * np.arange(len(measured)) * log.period)
+    assert latent_places(model, replace(log, measured=measured), nominal(model)) == ()
 
 
 def test_every_input_is_a_column_of_the_corrected_kernel() -> None:
