@@ -51,11 +51,16 @@ def constants_of(source: str) -> list[Constant]:
     """Constants of a module's source text, in order."""
     lines = source.split("\n")
     return [
-        _constant(lines, node, name, isinstance(node, ast.AnnAssign) and ast.unparse(node.annotation) == "Final")
+        _constant(lines, node, name, isinstance(node, ast.AnnAssign) and _is_final(node.annotation))
         for node in ast.parse(source).body
         if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None
         for name in _names(node)
     ]
+
+
+def _is_final(annotation: ast.expr) -> bool:
+    """``Final``, or ``Final[type]`` where the value does not say its type."""
+    return ast.unparse(annotation).partition("[")[0] == "Final"
 
 
 def _names(node: ast.Assign | ast.AnnAssign) -> list[str]:

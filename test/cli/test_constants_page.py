@@ -31,6 +31,7 @@ def test_a_calibrated_constant_names_what_gave_it() -> None:
          Constant("SHARE", "0.1", True, "Of the gap", "calibration", "a run")),
         ("SHARE: Final = 0.1  # of the gap", Constant("SHARE", "0.1", True)),
         ("SHARE = 0.1  # of the gap [taste]", Constant("SHARE", "0.1", False, "of the gap", "taste")),
+        ("MASS: Final[Mapping[str, float]] = {}  # kg [physics]", Constant("MASS", "{}", True, "kg", "physics")),
         ('NAME: Final = "µ"  # micro [display]', Constant("NAME", "'µ'", True, "micro", "display")),
     ],
 )  # fmt: skip

@@ -33,16 +33,17 @@ LONGEST: Final = 20.0  # s of a log that are looked at: time and memory grow wit
 VARIANCES: Final = tuple(float(v) for v in np.geomspace(1e-2, 1e6, 33))
 # Forward differences: m, m/s and Pa of the state, N, Pa/s, N m and Pa of the corrections [numerics]
 STATE_STEPS: Final = (*[1e-6] * 4, *[1e-5] * 4, 10.0, 10.0)
-STATES: Final = len(STATE_STEPS)
+STATES: Final = len(STATE_STEPS)  # positions, speeds and pressures of a run [definition]
+# As the steps of the state, one for each of CORRECTIONS [numerics]
 INPUT_STEPS: Final = (1.0, 1.0, 1e4, 1e4, 1.0, 1.0, 1.0, 0.1, 100.0)
 PARAMETER_STEP: Final = 0.1  # standard deviations [numerics]
 # Share of the whole, and of what is left, that a further place must close to be told [taste]
 FURTHER: Final = (0.1, 0.5)
 MOST: Final = 3  # places, two that one thing moves as one [taste]
 CLOSED: Final = 0.5  # share of the whole that they must close: what is quicker than the splines is not seen [numerics]
-BODY: Final = ("body_heave", "body_pitch")
-STRUTS: Final = ("front_force", "rear_force")
-AIRS: Final = ("front_air", "rear_air")
+BODY: Final = ("body_heave", "body_pitch")  # a force on the body, wherever it acts [definition]
+STRUTS: Final = ("front_force", "rear_force")  # what acts along both struts [definition]
+AIRS: Final = ("front_air", "rear_air")  # what acts on the air of both springs [definition]
 # A place of the contract, or several that one thing moves -> the inputs that it drives [definition]
 INPUTS: Final[Mapping[tuple[str, ...], tuple[str, ...]]] = {
     **{(name,): (name,) for name in CORRECTIONS},
