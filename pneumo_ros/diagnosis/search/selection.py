@@ -19,9 +19,9 @@ from typing import Final
 import numpy as np
 
 from pneumo_ros.arrays import Array
+from pneumo_ros.diagnosis.fit.needed import needed_unknowns
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, level
-from pneumo_ros.diagnosis.fit.uncertainty import UNUSED
 from pneumo_ros.effects.parameters import family_of
 from pneumo_ros.paths import share_file
 
@@ -117,6 +117,7 @@ class Scored:
     samples : effective number of fitted samples, what the training cost grows with
     fitted : robust mean square of the fitted samples, in the same way
     strain : what the prior of initial state and effects adds to the training cost
+    unknowns : of effects that the fit needs (:func:`pneumo_ros.diagnosis.fit.needed.needed_unknowns`)
     """
 
     fit: Fit
@@ -126,6 +127,7 @@ class Scored:
     samples: float = 600.0
     fitted: float = 1.0
     strain: float = 0.0
+    unknowns: float = 0.0
 
     @property
     def size(self) -> int:
@@ -140,14 +142,9 @@ class Scored:
         return self.fit.cost + PARAMETER_PENALTY * self.claims
 
     @property
-    def claims(self) -> int:
-        """Unknowns used, and effects claimed at both ends."""
-        return used_unknowns(self.fit) + sum(site == "both" for _, site in self.fit.candidate.laws)
-
-
-def used_unknowns(fit: Fit) -> int:
-    """Unknowns of a fit; of the atoms of a shape only those that are used."""
-    return int(np.count_nonzero(np.abs(fit.x) > UNUSED)) if fit.candidate.shapes else len(fit.x)
+    def claims(self) -> float:
+        """Unknowns of effects that are used, and effects claimed at both ends."""
+        return self.unknowns + sum(site == "both" for _, site in self.fit.candidate.laws)
 
 
 def score(problem: Problem, fit: Fit) -> Scored:
@@ -165,7 +162,10 @@ def score(problem: Problem, fit: Fit) -> Scored:
     samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
     fitted = level(fit.residual[problem.fitted])
     strain = float((problem.prior(fit.candidate) * fit.x)[count:] @ fit.x[count:])
-    return Scored(fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, float(samples), fitted, strain)
+    unknowns = needed_unknowns(problem, fit, PARAMETER_PENALTY)
+    return Scored(
+        fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, float(samples), fitted, strain, unknowns
+    )
 
 
 def _joined(squares: Array) -> Array:

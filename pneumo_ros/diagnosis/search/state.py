@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from pneumo_ros.diagnosis.fit.needed import needed_unknowns
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.search.screening import CandidateScore
-from pneumo_ros.diagnosis.search.selection import PARAMETER_PENALTY, used_unknowns
+from pneumo_ros.diagnosis.search.selection import PARAMETER_PENALTY
 
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
@@ -76,7 +77,7 @@ class Search:
         best: dict[tuple[Part, ...], Fit] = {}
         for one in (*self.laws, *self.structures):
             rival = best.get(one.candidate.laws)
-            if rival is None or _price(one) < _price(rival):
+            if rival is None or _price(self.problem, one) < _price(self.problem, rival):
                 best[one.candidate.laws] = one
         return list(best.values())
 
@@ -91,6 +92,6 @@ class Search:
         return min([self.refit, *self.finalists], key=lambda f: f.cost)
 
 
-def _price(one: Fit) -> float:
+def _price(problem: Problem, one: Fit) -> float:
     """Training cost with the penalty of what was fitted, and a little for each shape: a law that does as well wins."""
-    return one.cost + PARAMETER_PENALTY * used_unknowns(one) + len(one.candidate.shapes)
+    return one.cost + PARAMETER_PENALTY * needed_unknowns(problem, one, PARAMETER_PENALTY) + len(one.candidate.shapes)
