@@ -57,7 +57,8 @@ class Calibration:
         likely something else, with the same exception
     lost : share (rms) by which the structure closes more of the refit's gap in the fitted logs' kept blocks than in the
         held-out log, at which an effect is as likely something else: a law of the rig explains the next log as well;
-        with the same exception
+        with the same exception, and not of one that has mended its own equations along that log (:attr:`kept`), which
+        are as it left them where something else leads the run astray
     varied : share of what an effect's law is a function of that its sign does not explain, at which it is as likely
         something that knows the sign alone: dry friction and damping draw one picture at one speed
     at_bounds : number of an effect's parameters at their bounds at which "unknown" is as likely as the name
@@ -67,7 +68,7 @@ class Calibration:
         unless the equations miss twice as much without the error: one unknown motion is split between the two as it
         comes
     rest : times what an effect holds that one at another place must hold for that, with the same exception: a wrong
-        name leaves a third (rms) of what it stands for, and others fit that rest
+        name that closes just enough (:attr:`closes`) leaves a quarter in mean square, and others fit that rest
     traces : what the refit leaves beyond the noise floor, in floors, at which it is as likely the work of traces that
         every rig has, and of a floor that is known to a few per cent
     held_real : held-out gap of the refit over the noise floor above which a gap without a name is unknown, not none
@@ -94,9 +95,9 @@ class Calibration:
     instead: float = 2.0
     kept: float = 0.8
     unheld: tuple[float, float] = (0.8, 0.95)
-    lost: float = 0.6
+    lost: float = 0.4
     split: float = 0.5
-    rest: float = 10.0
+    rest: float = 4.0
     traces: float = 0.4
     held_real: float = 3.0
     right: float = 0.94
@@ -254,7 +255,7 @@ def credit(one: EffectEvidence, held: HeldOutGaps, calibration: Calibration, fit
                c.traces / max(beyond(held.refit, 1.0), 1e-9),
                min(held.kept / c.kept, one.mended / c.kept, left_over_held),
                min(max(0.0, one.unheld - c.unheld[0]) / (c.unheld[1] - c.unheld[0]), left_over_held),
-               min(max(0.0, fitted - held.closed) / c.lost, left_over_held)]  # fmt: skip
+               min(max(0.0, fitted - held.closed) / c.lost, one.mended / c.kept, left_over_held)]  # fmt: skip
     # What moves the rig looks like a sensor's error as well: such a name must hold no less than is left beside it, in
     # the run or, where that is led astray by what is left, in the rig's equations.
     if one.places[0].startswith(SENSOR):

@@ -81,15 +81,21 @@ def test_what_holds_more_of_the_run_than_is_left_stands_where_the_equations_see_
     assert (credit(one, replace(FAR, kept=1.0), CONSTANTS) > 0.5) is named
 
 
-@pytest.mark.parametrize("own, named", [(0.45, True), (0.6, False)])
-def test_what_explains_the_fitted_logs_and_not_the_next_is_something_else(own: float, named: bool) -> None:
-    """All of the fitted logs and a fifth of the held-out one; what holds more of that than is left there stands."""
+@pytest.mark.parametrize(
+    "own, mended, named", [(0.45, np.inf, True), (0.6, np.inf, False), (0.6, 0.1, True), (0.6, 0.9, False)]
+)
+def test_what_explains_the_fitted_logs_and_not_the_next_is_something_else(
+    own: float, mended: float, named: bool
+) -> None:
+    """All of the fitted logs and a fifth of the held-out one. What holds more of that than is left there stands, and so
+    does what has mended its equations along it: there something else leads the run astray.
+    """
     held = HeldOutGaps(1e6, 0.8e6)
-    one = replace(SURE, own=own, ceiling=own)
+    one = replace(SURE, own=own, ceiling=own, mended=mended)
     assert credit(one, held, CONSTANTS) > 0.8
     assert (credit(one, held, CONSTANTS, fitted=1.0) > 0.5) is named
     for k in (0.8, 1.0, 1.2):
-        likely = credit(SLIGHT, held, CONSTANTS, 0.2 + k * CONSTANTS.lost)
+        likely = credit(SLIGHT, held, CONSTANTS, fitted=0.2 + k * CONSTANTS.lost)
         assert likely == pytest.approx(1.0 / (1.0 + k**CONSTANTS.steepness), abs=1e-4)
 
 

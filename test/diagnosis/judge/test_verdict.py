@@ -202,9 +202,9 @@ def test_no_small_name_stands_beside_something_larger_without_one() -> None:
         ("sensor:sprung_front", 0.6, (20.0, 2000.0), True),  # the rig's equations tell a sensor from a force
         ("sensor:sprung_front", 0.3, (20.0, 2000.0), False),  # evidently smaller
         ("front_force", 0.6, None, True),
-        ("front_force", 0.03, None, False),  # what is refused holds nearly everything, this fits what it leaves
-        ("front_force", 0.05, None, True),
-        ("front_force", 0.03, (20.0, 2000.0), True),  # and tell place from place
+        ("front_force", 0.08, None, False),  # what is refused holds nearly everything, this fits what it leaves
+        ("front_force", 0.13, None, True),
+        ("front_force", 0.08, (20.0, 2000.0), True),  # and tell place from place
     ],
 )
 def test_what_is_small_beside_something_elsewhere_without_a_name(
@@ -222,7 +222,7 @@ def test_nobody_holds_more_than_all() -> None:
     """What runs away without the one that is refused says nothing of what the other holds."""
     refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "resonance", "hysteresis", unknowns=36)
     good, bent = evidence(pair, 1.0, 0.1, 0.1)[0], evidence(pair, 1.0, 0.1, 0.1, at_bounds=2.0)[1]
-    for share, verdict in ((0.2, "resonance"), (0.05, "unknown")):
+    for share, verdict in ((0.3, "resonance"), (0.2, "unknown")):
         effects = [replace(good, share=share), replace(bent, share=1e16, places=("rear_air",))]
         assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects).verdict == verdict
 
@@ -261,7 +261,7 @@ def test_a_sensor_error_must_hold_more_than_is_left(
     place: str, own: float, missing: tuple[float, float] | None, named: bool
 ) -> None:
     """What moves the rig looks like an error of a sensor as well; in the rig's equations it does not."""
-    refit, chosen = scored(400.0, 3000.0), scored(60.0, 1000.0, "lvdt_offset", unknowns=36)
+    refit, chosen = scored(400.0, 3000.0), scored(120.0, 1000.0, "lvdt_offset", unknowns=36)
     found = [replace(one, places=(place,), missing=missing) for one in evidence(chosen, 1.0, own, own)]
     told = judge(refit, [chosen], chosen, Calibration(), HeldOutGaps(20.0, 20.0 * own), found)
     assert told.verdict == ("lvdt_offset" if named else "unknown")
