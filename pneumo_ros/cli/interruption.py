@@ -8,6 +8,7 @@ import threading
 from types import FrameType
 
 COMPILER = "llvmlite.binding"  # calls back from compiled code
+FINALISER = "__del__"  # the interpreter drops what it raises, and says so
 LATER = 0.02  # s
 
 
@@ -21,7 +22,8 @@ class Interrupted(KeyboardInterrupt):
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Handler of a signal; while the compiler has called back, which drops what is raised there, it comes again.
+    """Handler of a signal; where what is raised would be dropped, it comes again: the compiler has called back, or an
+    object is being taken away.
 
     Raises
     ------
@@ -29,7 +31,7 @@ def interrupt(number: int, frame: FrameType | None) -> None:
         anywhere else.
     """
     while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith(COMPILER):
+        if frame.f_code.co_name == FINALISER or str(frame.f_globals.get("__name__")).startswith(COMPILER):
             threading.Timer(LATER, os.kill, (os.getpid(), number)).start()
             return
         frame = frame.f_back

@@ -47,6 +47,28 @@ def test_an_interruption_that_meets_a_callback_of_the_compiler_is_not_lost() -> 
     assert ended(DROPPED) == (0, "caught\n", "")
 
 
+TAKEN_AWAY = """
+import os, signal, time
+from pneumo_ros.cli.interruption import interrupt
+signal.signal(signal.SIGINT, interrupt)
+class Held:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000): pass
+try:
+    held = Held()
+    del held
+    time.sleep(10)
+except KeyboardInterrupt:
+    print("caught")
+"""
+
+
+def test_an_interruption_that_meets_an_object_taken_away_is_neither_lost_nor_told_as_a_fault() -> None:
+    """As a process's handle is, when the session has ended: a traceback stood among the last lines."""
+    assert ended(TAKEN_AWAY) == (0, "caught\n", "")
+
+
 LOADED = """
 import sys, signal
 before = set(sys.modules)
