@@ -62,7 +62,8 @@ class EffectEvidence:
     instead : gap left by whatever may act there in place of the effect, over what the structure leaves, rms; 1 where
         no such place is known
     follows : share of what the structure without the effect predicts at either end of a sensor's range that its reading
-        follows, over the least that this kind of error leaves; infinite where nothing is asked
+        follows, in the fitted logs and in the held-out one, over the least that this kind of error leaves; infinite
+        where nothing is asked
     missing : what the structure leaves in the equations that the effect acts in, along the held-out log, and what is
         left there without it, mean squares in null variances; None where nobody looked, or the tolerances answer for it
     mended : share of what the refit leaves in the equations that it acts in that the structure leaves as well, mean
@@ -208,7 +209,7 @@ def closable(
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
             at_bounds=firm, bent=bent, varied=_varied(problem, law),
-            follows=_followed(problem, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
+            follows=_followed(problem, bare, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
 
@@ -232,14 +233,32 @@ def _varied(problem: Problem, law: Part) -> float:
     return effect.varied(law[1]) if isinstance(effect, NeedsVariety) else np.inf
 
 
-def _followed(problem: Problem, holdout: Record, predicted: Array, law: Part, places: Sequence[str]) -> float:
-    """How far a reading follows, over what is asked of this kind of error; infinite where nothing is."""
+def _followed(
+    problem: Problem, bare: Fit, holdout: Record, predicted: Array, law: Part, places: Sequence[str]
+) -> float:
+    """How far a reading follows, over what is asked of this kind of error; infinite where nothing is.
+
+    In the held-out log and in the fitted ones: a session may hardly come to where the other stays long.
+
+    ``bare`` : the structure without the effect; ``predicted`` : its run of the held-out log
+    """
     effect = problem.model.effects[law[0]]
     if not isinstance(effect, IsFollowed) or effect.follows <= 0.0:
         return np.inf
     channels = [problem.model.channels.index(place.removeprefix(SENSOR)) for place in places]
-    seen = holdout.weight > 0.0
-    return min(followed(holdout.measured[seen[:, k], k], predicted[seen[:, k], k]) for k in channels) / effect.follows
+    with np.errstate(divide="ignore", invalid="ignore"):  # where nothing was measured nothing is compared
+        fitted = problem.measured - bare.residual / problem.weight
+    return (
+        min(
+            followed(reading[seen[:, k], k], there[seen[:, k], k])
+            for reading, there, seen in (
+                (problem.measured, fitted, problem.weight > 0.0),
+                (holdout.measured, predicted, holdout.weight > 0.0),
+            )
+            for k in channels
+        )
+        / effect.follows
+    )
 
 
 def followed(reading: Array, there: Array) -> float:
