@@ -77,15 +77,18 @@ def _leads(problem: Problem, best: Fit, listed: list[list[tuple[int, int]]]) -> 
     model = problem.model
     assert isinstance(model, HasEvents) and best.jacobian is not None
     left = np.sqrt(np.maximum(1.0, np.mean(best.residual**2, axis=0)))
-    columns = []
-    for k, events in enumerate(listed):
-        for event in events:
-            records = list(problem.records)
-            records[k] = model.advanced(records[k], [event], np.ones(1))
-            one = replace(problem, records=tuple(records))
-            # Measurements and weights stay: only the prediction of this log moves.
-            there = (problem.measured - one.predict(best.candidate, best.x)) * problem.weight
-            columns.append(((there - best.residual) / left).ravel())
+
+    def moved(jump: tuple[int, tuple[int, int]]) -> Array:
+        """What a jump one sample earlier does; only its own log's prediction moves."""
+        k, event = jump
+        rows = problem.rows_of[k]
+        advanced = model.advanced(problem.records[k], [event], np.ones(1))
+        there = problem.measured[rows] - problem.predict_log(k, advanced, best.candidate, best.x)
+        change = np.zeros_like(best.residual)
+        change[rows] = (there * problem.weight[rows] - best.residual[rows]) / left
+        return change.ravel()
+
+    columns = problem.each(moved, [(k, event) for k, events in enumerate(listed) for event in events])
     T = np.array(columns).T
     J = (best.jacobian / left[:, None]).reshape(T.shape[0], -1)
     A = np.concatenate([T, J], axis=1)

@@ -252,14 +252,15 @@ class Problem:
 
     def predict(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) averaged prediction of all logs."""
+        return np.vstack([self.predict_log(k, record, candidate, x) for k, record in enumerate(self.records)])
+
+    def predict_log(self, k: int, record: Record, candidate: Candidate, x: Array) -> Array:
+        """(n_k, C) averaged prediction of one log, which may stand there in another form."""
         nuisance, active = self.nuisance(x), self.active(candidate, self.values(candidate, x))
-        out = []
-        for k, record in enumerate(self.records):
-            initial, std = self.model.initial(record, active)
-            first = len(self.model.parameters) + k * self.states
-            initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
-            out.append(self._averaged(k, self.model.predict(record, nuisance, initial, active)))
-        return np.vstack(out)
+        initial, std = self.model.initial(record, active)
+        first = len(self.model.parameters) + k * self.states
+        initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
+        return self._averaged(k, self.model.predict(record, nuisance, initial, active))
 
     def gap(self, residual: Array) -> float:
         """Normalised gap on the fitted logs (averaged samples) of a residual in sigmas."""
