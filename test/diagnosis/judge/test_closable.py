@@ -3,11 +3,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from helpers.own_logs import log
 
-from pneumo_ros.diagnosis.judge.closable import ENOUGH, followed, worth_asking
-from pneumo_ros.effects.parameters import STILL_FOLLOWS
+from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.solver import fit
+from pneumo_ros.diagnosis.judge.closable import ENOUGH, closable, followed, worth_asking
+from pneumo_ros.diagnosis.judge.held_out import total_floor
+from pneumo_ros.effects.parameters import STILL_FOLLOWS, Active
+from pneumo_ros.effects.rig_model import RigModel
+from pneumo_ros.rig import load_rig
 
 RNG = np.random.default_rng(5)
 THERE = 4e5 + 4e4 * np.sin(np.linspace(0.0, 60.0, 4000)) + RNG.normal(0.0, 8e3, 4000)  # Pa
@@ -43,3 +51,22 @@ def test_a_structure_that_leaves_nothing_is_asked_for_nothing_else() -> None:
     assert worth_asking(1e-5, 1e-4, floor)
     assert not worth_asking(8e-5, 1e-4, floor)  # hardly less
     assert not worth_asking(0.0, 0.06 * floor**2, floor)  # all of it is the floor's own uncertainty
+
+
+@pytest.mark.parametrize("clips, follows", [(False, True), (True, False)])
+def test_a_gauge_that_clips_in_the_fitted_log_alone_is_no_scale(clips: bool, follows: bool) -> None:
+    """The held-out session never comes to where it clips; a scale that is off is followed in both."""
+    model = RigModel(load_rig())
+    scale = () if clips else (Active("pressure_scale", "front_pressure", (-0.2, 0.0)),)
+    fitted, held = log(model, 1, None, scale), log(model, 2, None, scale)
+    front = model.channels.index("front_pressure")
+    if clips:
+        reading = fitted.measured.copy()
+        reading[:, front] = np.minimum(reading[:, front], np.quantile(reading[:, front], 0.9))
+        fitted = replace(fitted, measured=reading)
+    problem = Problem(model, (fitted,))
+    law = Candidate((("pressure_scale", "front_pressure"),))
+    best = fit(problem, law, problem.start(law, None, (-0.05, 0.0)), iterations=4)
+    base = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=4)
+    told = closable(problem, base, best, held, total_floor(held), 0.5, ())
+    assert (told.effects[0].follows > 1.0) is follows
