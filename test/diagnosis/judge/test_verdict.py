@@ -28,10 +28,14 @@ LIMITS = Thresholds()
 CONSTANTS = Calibration()
 
 
-def scored(level: float, cost: float, *effects: str, unknowns: int = 30, site: str = "front") -> Scored:
+REFIT_UNKNOWNS = 30  # tolerances and initial states that every structure has
+
+
+def scored(level: float, cost: float, *effects: str, unknowns: int = REFIT_UNKNOWNS, site: str = "front") -> Scored:
     candidate = Candidate(tuple((name, site) for name in effects))
     blocks = level * np.array([0.9, 1.0, 1.1, 1.0])
-    return Scored(Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6))), level, blocks, 10.0, fitted=level)
+    fit = Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6)))
+    return Scored(fit, level, blocks, 10.0, fitted=level, unknowns=unknowns - REFIT_UNKNOWNS)
 
 
 def evidence(
