@@ -294,5 +294,6 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     A = (state.jacobian[rows] * root[:, :, None]).reshape(r.size, len(state.x))
     prior = problem.prior(state.candidate)
     strength = 1.0 / problem.pace.correlation
-    H = strength * (A.T @ A) + np.diag(prior + 1e-9)
-    return H, strength * (A.T @ (r * root).ravel()) + prior * state.x
+    with np.errstate(over="ignore", invalid="ignore"):  # a run that runs away: no step from there is taken
+        H = strength * (A.T @ A) + np.diag(prior + 1e-9)
+        return H, strength * (A.T @ (r * root).ravel()) + prior * state.x

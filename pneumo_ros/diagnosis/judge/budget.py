@@ -131,7 +131,8 @@ class _Answer:
         residual = problem.residual(candidate, restricted(problem, best, candidate)).ravel()
         if not np.all(np.isfinite(residual)):
             return problem.nuisance(best.x)
-        strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + float(np.mean(residual**2))))
+        with np.errstate(over="ignore"):  # of a run that leaves the log by so much the square has no end
+            strength = 1.0 / (problem.pace.correlation * (COST_FLOOR + float(np.mean(residual**2))))
         x, low, high = best.x[: problem.fixed], *(b[: problem.fixed] for b in problem.bounds(Candidate()))
         step = bounded_newton(strength * self.gram + np.eye(problem.fixed), strength * self.columns.T @ residual + x,
                               low - x, high - x)  # fmt: skip

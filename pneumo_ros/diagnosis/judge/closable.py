@@ -30,6 +30,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
 INSTEAD: Final = 30  # iterations of a fit with something of another kind in an effect's place [numerics]
+FAR: Final = 1e3  # gap of a run that leaves the log for good; squares still have a meaning there [numerics]
 SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
@@ -70,6 +71,7 @@ class EffectEvidence:
         square above noise; infinite where nobody looked, or where they hardly show a gap
     varied : how varied what its law is a function of was along the logs, see
         :class:`~pneumo_ros.diagnosis.traits.NeedsVariety`; infinite where its law needs no variety
+    props : whether the structure runs away without it: something else in it drives the rig, which nothing passive does
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -89,6 +91,7 @@ class EffectEvidence:
     missing: tuple[float, float] | None = None
     mended: float = np.inf
     varied: float = np.inf
+    props: bool = False
 
     @property
     def family(self) -> str:
@@ -196,7 +199,7 @@ def closable(
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
-        without = missed.total
+        without = min(missed.total, FAR)
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         # The equations estimate the tolerances anew: where these answer for the effect, they do so there as well.
         answered = problem.strains(bare.x) and not problem.strains(best.x)
@@ -208,7 +211,7 @@ def closable(
                 missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
-            at_bounds=firm, bent=bent, varied=_varied(problem, law),
+            at_bounds=firm, bent=bent, varied=_varied(problem, law), props=refit < FAR <= without,
             follows=_followed(problem, bare, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip

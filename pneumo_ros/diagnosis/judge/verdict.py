@@ -192,7 +192,9 @@ def judge(
         unknown = unexplained(refit.level, held, calibration)
         scaled = {candidate: p * (1.0 - unknown) for candidate, p in named.items()}
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
-    worse = held.chosen >= held.refit or held.within_form
+    # What drives the rig and what keeps that from running away cancel out: neither is known to be there.
+    driven = any(one.props for one in evidence)
+    worse = held.chosen >= held.refit or held.within_form or driven
     fitted = 1.0 - float(np.sqrt(chosen.level / max(refit.level, 1e-12)))
     credits = {one.law: 0.0 if worse else credit(one, held, calibration, fitted) for one in evidence}
     trust = _beside_unnamed(credits, evidence, calibration)

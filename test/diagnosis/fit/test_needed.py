@@ -79,3 +79,16 @@ def test_of_two_atoms_that_do_the_same_one_is_needed(problem: Problem, lawful: F
     single[[strong, twin]] = 2.0 * size, 0.0
     two, one = (needed_unknowns(problem, replace(found, x=x, jacobian=columns), PRICE) for x in (doubled, single))
     assert two == pytest.approx(one, abs=0.1) and one > 2.9
+
+
+def test_telling_few_of_many_atoms_costs_what_the_choice_says(problem: Problem) -> None:
+    """One atom that is needed, of the n that the shape offers: its price, and twice the logarithm of n."""
+    alone = Candidate((SHAPE,))
+    parameters = problem.parameters_of[SHAPE]
+    sizes = [0.0 if p.size else p.typical for p in parameters]
+    sizes[2] = 1.0
+    start = problem.start(alone, None, sizes)
+    found = replace(fit(problem, alone, start, iterations=1), x=start)
+    place = len(parameters) - sum(p.size for p in parameters)
+    claimed = 1.0 + 2.0 * np.log(sum(p.size for p in parameters)) / PRICE
+    assert claimed <= needed_unknowns(problem, found, PRICE) <= claimed + place

@@ -146,6 +146,16 @@ def test_a_wrong_name_is_unknown(gaps: tuple[float, float, float], held: HeldOut
     assert calm.verdict == "bellows_mode" and calm.unknown < 0.05
 
 
+@pytest.mark.parametrize(("props", "verdict"), [(False, "leak+viscous_damping"), (True, "unknown")])
+def test_names_that_drive_the_rig_and_hold_it_are_none(props: bool, verdict: str) -> None:
+    """A frame that rubs, to a library without friction: a stiffness that drives, and a damper without which it runs
+    away.
+    """
+    refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "viscous_damping", unknowns=36)
+    effects = [replace(one, props=props) for one in evidence(pair, 1.0, 0.1, 0.1)]
+    assert judge(refit, [pair], pair, Calibration(), HeldOutGaps(20.0, 1.5), effects).verdict == verdict
+
+
 def test_named_and_unnamed_stand_beside_each_other() -> None:
     """Of two effects the one whose place can be closed far better is not what the other one is."""
     refit, pair = scored(400.0, 3000.0), scored(0.6, -500.0, "leak", "bump_stop", unknowns=36)
