@@ -56,7 +56,8 @@ class Planned:
 
 def case_prefix(name: str) -> str:
     """What the names of a set's cases begin with: those of a full set are ``full-001`` and on, in its own folder."""
-    return "full" if name in ("full-0.3", "full-0.4", "full-0.5") else name  # the sets before kept their numbers
+    of_releases = {f"full-0.{release}" for release in range(3, 7)}  # those before kept the number in their names
+    return "full" if name in of_releases else name
 
 
 def drawn_side(name: str, rng: np.random.Generator) -> str | None:
