@@ -65,6 +65,13 @@ def test_the_frame_rubs_against_the_ground_not_against_its_base(real: Path) -> N
 
 
 @pytest.mark.slow
+def test_without_friction_among_the_families_the_frame_is_unknown(real: Path) -> None:
+    """What is named then drives the frame, and a damper keeps that from running away: a gap without end without it."""
+    without = prepared(EXAMPLES / "frame" / "rig.py", [real / "frame_450g_x.mat"], without=["coulomb_friction"])
+    assert without.diagnose().verdict == "unknown"
+
+
+@pytest.mark.slow
 def test_play_between_teeth_of_another_maker_is_named(tmp_path: Path) -> None:
     gearbox(tmp_path / "log.csv", 3)
     found = diagnosed("gearbox", tmp_path / "log.csv")

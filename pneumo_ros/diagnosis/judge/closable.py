@@ -30,7 +30,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 
 STEPS: Final = 4  # iterations of a fit with something added or taken away [numerics]
 INSTEAD: Final = 30  # iterations of a fit with something of another kind in an effect's place [numerics]
-FAR: Final = 1e3  # gap of a run that leaves the log for good; squares still have a meaning there [numerics]
+FAR: Final = 1e3  # gap from which on a run has left the log for good, by how much tells nothing [taste]
 SLACK: Final = 0.03  # of what there was to close: what a law of the right kind may leave without a word [taste]
 WORTH: Final = 0.3  # share of what is left that a place must close to be called the remainder's [taste]
 END: Final = 0.05  # share of a log's samples that is an end of a sensor's range [taste]
@@ -199,7 +199,7 @@ def closable(
     def judged(law: Part) -> EffectEvidence:
         bare = _fitted(problem, reduced(problem, best, of_law(best.candidate, law), STEPS, _all(problem)))
         missed, ceiling = held_by(problem, bare, holdout), remainders[at[law]]
-        without = min(missed.total, FAR)
+        without = missed.total
         firm, bent = at_bounds(problem, best, of_law(best.candidate, law))
         # The equations estimate the tolerances anew: where these answer for the effect, they do so there as well.
         answered = problem.strains(bare.x) and not problem.strains(best.x)
@@ -289,8 +289,8 @@ def _beside(
 
 
 def _above(gap: float, floor: float) -> float:
-    """Mean square of a gap above a floor."""
-    return max(gap**2 - floor**2, 0.0)
+    """Mean square of a gap above a floor; of a run that has left the log for good that of :data:`FAR`."""
+    return max(min(gap, FAR) ** 2 - floor**2, 0.0)
 
 
 def _anything(

@@ -194,9 +194,9 @@ def judge(
         return Opinion(chosen, "unknown" if unknown > 0.5 else "none", scaled, unknown)
     # What drives the rig and what keeps that from running away cancel out: neither is known to be there.
     driven = any(one.props for one in evidence)
-    worse = held.chosen >= held.refit or held.within_form or driven
+    refused = held.chosen >= held.refit or held.within_form or driven
     fitted = 1.0 - float(np.sqrt(chosen.level / max(refit.level, 1e-12)))
-    credits = {one.law: 0.0 if worse else credit(one, held, calibration, fitted) for one in evidence}
+    credits = {one.law: 0.0 if refused else credit(one, held, calibration, fitted) for one in evidence}
     trust = _beside_unnamed(credits, evidence, calibration)
     trusted = max(trust.values(), default=0.0)
     unknown = (1.0 - trusted) * unexplained(refit.level, held, calibration)

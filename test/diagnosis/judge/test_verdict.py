@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.structures import scored
 
-from pneumo_ros.diagnosis.fit.problem import Candidate
-from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.judge.ambiguity import ambiguity_group, as_good
 from pneumo_ros.diagnosis.judge.closable import EffectEvidence
 from pneumo_ros.diagnosis.judge.verdict import (
     Calibration,
@@ -26,16 +24,6 @@ from pneumo_ros.diagnosis.search.selection import SHARPNESS, Scored, Thresholds,
 CALM = HeldOutGaps(1.2, 1.1)
 LIMITS = Thresholds()
 CONSTANTS = Calibration()
-
-
-REFIT_UNKNOWNS = 30  # tolerances and initial states that every structure has
-
-
-def scored(level: float, cost: float, *effects: str, unknowns: int = REFIT_UNKNOWNS, site: str = "front") -> Scored:
-    candidate = Candidate(tuple((name, site) for name in effects))
-    blocks = level * np.array([0.9, 1.0, 1.1, 1.0])
-    fit = Fit(candidate, np.zeros(unknowns), cost, np.zeros((1, 6)))
-    return Scored(fit, level, blocks, 10.0, fitted=level, unknowns=unknowns - REFIT_UNKNOWNS)
 
 
 def evidence(
@@ -82,24 +70,6 @@ def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() 
     assert found.verdict == "leak" and found.of("orifice_coefficient") > 0.01
     far = opinion(refit, orifice, scored(9.0, 1360.0, "leak", unknowns=32), held=HeldOutGaps(20.0, 1.4))
     assert far.verdict == "orifice_coefficient" and far.of("leak") < 1e-3
-
-
-def test_tolerances_that_are_stretched_count_as_the_maker_states_them() -> None:
-    """What leaves a little less by moving five numbers of the rig by two sigmas each is the less likely one."""
-    refit = scored(900.0, 1000.0)
-    leak = scored(1.0, 300.0, "leak")
-    heat = replace(scored(0.9, 295.0, "heat_transfer"), stretch=5 * 2.0**2)
-    assert log_weight(heat, refit) - log_weight(replace(heat, stretch=0.0), refit) == pytest.approx(-10.0)
-    assert select(refit, [leak, heat], Thresholds()) is leak
-    assert select(refit, [leak, replace(heat, stretch=0.0)], Thresholds()) is not leak
-
-
-def test_of_laws_that_cost_as_much_the_kept_blocks_choose() -> None:
-    """Two laws of friction whose fits end a tenth apart, one of them in a local minimum that the kept blocks see."""
-    refit, stuck = scored(380.0, 3000.0), scored(2.93, -600.1, "coulomb_friction.presliding")
-    right = scored(0.25, -600.0, "coulomb_friction.soft")
-    assert select(refit, [stuck, right], LIMITS) is right
-    assert select(refit, [scored(2.93, -605.0, "coulomb_friction.presliding"), right], LIMITS) is not right
 
 
 def test_how_many_effects_is_judged_by_the_cost() -> None:
@@ -291,52 +261,6 @@ def test_where_the_kept_blocks_say_nothing_the_fit_must_say_it_by_far() -> None:
     assert opinion(refit, scored(0.20, -900.0, "bump_stop", unknowns=34)).verdict == "bump_stop"
     assert opinion(refit, scored(0.20, -500.0, "bump_stop", unknowns=34)).verdict == "none"
     assert opinion(refit, scored(0.25, -900.0, "bump_stop", unknowns=34)).verdict == "none"  # it spoils the others
-
-
-@pytest.mark.parametrize("kept, fitted, taken", [(0.2, 0.5, True), (0.2, 0.3, False), (0.1, 0.9, False)])
-def test_a_third_effect_is_shown_by_fitted_and_kept_samples_and_a_second_by_the_kept(
-    kept: float, fitted: float, taken: bool
-) -> None:
-    refit = scored(4000.0, 9000.0)
-    one, two = scored(600.0, 5000.0, "leak"), scored(100.0, 3000.0, "leak", "cg_shift")
-
-    def richer(than: Scored, *names: str) -> Scored:
-        falls = {"level": than.level * np.exp(-kept), "fitted": than.fitted * np.exp(-fitted)}
-        return replace(scored(1.0, than.fit.cost - 500.0, *names), **falls)
-
-    three = richer(two, "leak", "cg_shift", "payload")
-    assert select(refit, [one, two, three], LIMITS).size == (3 if taken else 2)
-    assert select(refit, [one, richer(one, "leak", "cg_shift")], LIMITS).size == 1
-
-
-def test_the_group_holds_what_is_not_excluded() -> None:
-    """Beside none and unknown as well; the verdict itself first, the likeliest next."""
-    chosen = scored(0.2, -900.0)
-
-    def group(verdict: str, named: dict[tuple[str, ...], float]) -> tuple[str, ...]:
-        candidates = {scored(1.0, 0.0, *names).fit.candidate: p for names, p in named.items()}
-        return ambiguity_group(None, Opinion(chosen, verdict, candidates, 0.5), chosen, [])  # type: ignore[arg-type]
-
-    assert group("none", {(): 0.7, ("leak",): 0.1, ("dead_volume",): 0.16, ("payload",): 0.04}) == (
-        "dead_volume", "leak")  # fmt: skip
-    assert group("unknown", {("leak", "payload"): 0.2, ("leak",): 0.3}) == ("leak", "leak+payload")
-    assert group("leak", {(): 0.02, ("leak",): 0.9, ("heat_transfer",): 0.08}) == ("leak", "heat_transfer")
-
-
-def test_a_rival_that_leaves_what_another_law_might_is_in_the_group() -> None:
-    refit, chosen = scored(550.0, 3450.0), scored(0.24, -740.0, "leak")
-    assert as_good(refit, chosen, scored(0.5, -300.0, "orifice_coefficient"))
-    assert not as_good(refit, chosen, scored(3.0, 700.0, "orifice_coefficient"))
-    small, tiny = scored(0.43, -480.0), scored(0.3, -600.0, "leak")
-    assert not as_good(small, tiny, scored(0.41, -500.0, "heat_transfer")), "of a small gap it must close most as well"
-
-
-def test_both_ends_are_claimed_only_where_both_were_seen() -> None:
-    """A stop that the front never reached in this log may still act there on another road."""
-    refit, rear = scored(19.0, 1200.0), scored(0.25, -780.0, "bump_stop", site="rear")
-    for cost, site in ((-780.0, "rear"), (-790.0, "both")):
-        both = scored(0.25, cost, "bump_stop", site="both")
-        assert select(refit, [both, rear], LIMITS).fit.candidate.parts == (("bump_stop", site),)
 
 
 @pytest.mark.parametrize(("form", "verdict"), [(0.9, "none"), (0.0, "unknown")])
