@@ -20,7 +20,8 @@ from numba import njit
 from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.own_rig.description import Description, usable_name
 from pneumo_ros.own_rig.kernel import Kernel, Names, build, tried
-from pneumo_ros.slots.kinds import IN_EQUATIONS, Force, Slot, zero
+from pneumo_ros.own_rig.quantities import UNITS
+from pneumo_ros.slots.kinds import IN_EQUATIONS, Flow, Force, Slot, zero
 from pneumo_ros.slots.library import families_of
 
 ARGUMENTS = 4  # x, u, p, f
@@ -129,7 +130,7 @@ def _slots(module: ModuleType, path: Path, rig: Description) -> tuple[Slot, ...]
 
 
 def check_slots(slots: Sequence[Slot], rig: Description, path: Path, key: str) -> None:
-    """Names apart and usable, signals that the rig file has, families that fit.
+    """Names apart and usable, signals that the rig file has, a gas under a pressure, families that fit.
 
     Raises
     ------
@@ -146,6 +147,11 @@ def check_slots(slots: Sequence[Slot], rig: Description, path: Path, key: str) -
         known = rig.channels if one.kind == "sensor" else rig.inputs
         if one.kind in ("input", "sensor") and one.name not in known:
             raise not_one_of(f"no such {one.kind}", one.name, known, where=path, key=key)
+        # Of a unit that is not listed nothing is known; a ratio of pressures has none.
+        if isinstance(one, Flow) and one.gas and UNITS.get(one.pressure_unit, UNITS["Pa"])[2] not in ("Pa", "1"):
+            raise InputError("a gas that flows without a pressure", where=path, key=f"{key}.{one.name}.pressure_unit",
+                             value=one.pressure_unit, allowed="a unit of pressure",
+                             remedy="gas=False, where no gas flows (a liquid by its level, heat)")  # fmt: skip
     _check_families(rig, slots)
 
 

@@ -94,7 +94,8 @@ class Flow(Slot):
     ----------
     up, down : pressures, or levels, on either side; absolute ones for a gas
     flow : what the nominal model lets flow there; 0 where the nominal place is tight
-    gas : whether the flow chokes, as a gas does; a liquid's goes with the root of the difference
+    gas : whether the flow chokes, as a gas does; a liquid's goes with the root of the difference. A gas needs a
+        ``pressure_unit`` of pressure
     unit, pressure_unit : of the flow and of the pressures
     """
 

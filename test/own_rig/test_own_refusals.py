@@ -139,6 +139,8 @@ BAD: dict[str, Change] = {
     "two slots of one name": py('Sensor("position"),', 'Sensor("position"), Sensor("position"),'),
     "a coordinate that is no function": py("travel=lambda x, u, p: x.position", "travel='position'"),
     "a force without rate and travel": py(WITHOUT_COORDINATES, ""),
+    "a gas under a temperature": py(
+        "Sensor\n\nSLOTS = [", 'Sensor, Flow\n\nSLOTS = [\n    Flow("wall", pressure_unit="K"),'),
     "a sensor of no channel": py('Sensor("position")', 'Sensor("pressure")'),
     "a family that its slot cannot have": names("rig: cart", "rig: cart\nfamilies: {rail: [leak]}"),
     "a column that is not there": names("field: x", "field: y"),
