@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 from pneumo_ros.arrays import Array
 
 F = TypeVar("F", bound=Callable[..., Any])
-CHANNELS = 0
 
 
 def compiled(function: F) -> F:

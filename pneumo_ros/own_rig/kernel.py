@@ -55,7 +55,7 @@ class Kernel:
 
     Attributes
     ----------
-    run : :func:`pneumo_ros.own_rig.loop.run`
+    run : :func:`pneumo_ros.own_rig.loop.run`, which returns its arrays, see :func:`returning`
     derivative, coordinates : the user's own, of arrays, written into their last argument
     compiled : whether numba compiled it
     why_not : numba's first line where it did not
@@ -93,13 +93,34 @@ def build(
     shape = [len(row) for row in coordinates]
     try:
         module = _module(names, own, shape, source, compiled=True)
-        kernel = Kernel(module.run, module.derivative, module.coordinates, True)
+        run = returning(module.run, len(names.channels))
+        kernel = Kernel(run, module.derivative, module.coordinates, True)
         tried(kernel, names, len(shape))
         return kernel
     except NumbaError as error:
         reason = next((line.strip() for line in str(error).splitlines() if line.strip()), "no reason given")
         module = _module(names, own, shape, source, compiled=False)
-        return Kernel(module.run, module.derivative, module.coordinates, False, reason)
+        run = returning(module.run, len(names.channels))
+        return Kernel(run, module.derivative, module.coordinates, False, reason)
+
+
+def returning(run: Callable[..., None], channels: int) -> Callable[..., tuple[Array, Array, Array]]:
+    """A run into arrays as one that returns them: channels (N, C), NaN after a divergence, coordinates (N, K, 3) and
+    what acts (N, K).
+
+    Compiled code does not return them: Ctrl-C that came meanwhile is raised while numba makes Python's objects of
+    several arrays, and it goes on with one that is not there.
+    """
+
+    def returned(
+        x0: Array, u: Array, held: Any, period: float, substeps: int, p: Any, terms: Any, *others: Any
+    ) -> tuple[Array, Array, Array]:
+        rows, slots = len(u), len(terms)
+        out, where, acted = np.full((rows, channels), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
+        run(x0, u, held, period, substeps, p, terms, *others, out, where, acted)
+        return out, where, acted
+
+    return returned
 
 
 def tried(kernel: Kernel, names: Names, slots: int) -> tuple[Array, Array, Array]:
@@ -148,7 +169,7 @@ def _text(names: Names, states: bool, shape: Sequence[int], cached: bool, compil
     kinds = {"State": names.states, "Inputs": names.inputs, "Parameters": names.parameters, "Acting": names.slots}
     x, u, p, f = (_packed(kind, fields, arg) for (kind, fields), arg in zip(kinds.items(), "xupf", strict=True))
     lines = ["from __future__ import annotations", "from collections import namedtuple", "from numba import njit"]
-    lines += [f"# made of {hashlib.sha256(made_of.encode()).hexdigest()}", f"CHANNELS = {len(names.channels)}"]
+    lines += [f"# made of {hashlib.sha256(made_of.encode()).hexdigest()}"]
     lines += [f"{kind} = namedtuple({kind!r}, {list(fields)!r})" for kind, fields in kinds.items()]
     lines += [
         f'compiled = njit(error_model="numpy", nogil=True, cache={cached})' if compiled else "compiled = lambda f: f"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.own_rig.bridge import CHANNELS, compiled, coordinates, derivative, reading, settle
+from pneumo_ros.own_rig.bridge import compiled, coordinates, derivative, reading, settle
 from pneumo_ros.slots.flow import MEMORIES as FLOW_MEMORIES
 from pneumo_ros.slots.flow import advance as advance_flow
 from pneumo_ros.slots.flow import flow
@@ -111,11 +111,12 @@ def finite(x: Array) -> bool:
 @compiled
 def run(
     x0: Array, u: Array, held: Any, period: float, substeps: int, p: Array, terms: Any, on: Any, P: Array, S: Array,
-    since: float,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Channels (N, C), coordinates (N, K, 3) and what acts (N, K); channels are NaN after a divergence."""
+    since: float, out: Array, where: Array, acted: Array,
+) -> None:  # fmt: skip
+    """Into channels ``out`` (N, C), coordinates ``where`` (N, K, 3) and what acts ``acted`` (N, K); it ends with the
+    row at which the run diverges.
+    """
     rows, slots = len(u), len(terms)
-    out, where, acted = np.full((rows, CHANNELS), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
     c, z, f = np.zeros((slots, 3)), np.zeros((slots, MEMORIES)), np.zeros(slots)
     x, trial, K, ends = x0.copy(), x0.copy(), np.zeros((4, len(x0))), np.zeros((3, len(held)))
     h = period / substeps
@@ -133,4 +134,3 @@ def run(
                     step(x, ends, h, p, terms, on, P, S, c, z, f, K, trial)
                 settle(x, ends[2], p)
                 advance(x, ends[2], p, terms, on, P, S, h, c, z)
-    return out, where, acted

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -230,3 +232,41 @@ def test_the_start_of_a_motion_is_as_sure_as_it_is_told(
         off.append((found - [motion(np.zeros(1))[0], rate]) / std)
     assert np.sqrt(np.mean(np.square(off), axis=0)).max() < 1.6
     assert std[1] < 0.5 + 200.0 * noise
+
+
+STOPPED = """
+import signal, sys, time
+from pathlib import Path
+import numpy as np
+from pneumo_ros.own_rig.description import read_description
+from pneumo_ros.own_rig.kernel import SCALES, VALUES
+from pneumo_ros.own_rig.physics import load_physics
+
+rig = Path(sys.argv[1])
+kernel = load_physics(rig, read_description(rig.with_name("rig.yaml"))).kernel
+assert kernel.compiled
+signal.signal(signal.SIGALRM, signal.default_int_handler)
+
+def run():
+    kernel.run(np.ones(2), np.zeros((300_000, 1)), np.zeros(1, bool), 1e-3, 1, np.array([2.0, 80.0, 1.0]),
+               np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, VALUES)), np.ones((1, SCALES)), 0.0)
+
+run()
+began = time.perf_counter()
+run()
+half = 0.5 * (time.perf_counter() - began)
+for _ in range(3):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, half)
+        run()
+        time.sleep(60.0)
+    except KeyboardInterrupt:
+        print("stopped")
+"""
+
+
+def test_an_interruption_that_meets_a_run_is_one(tmp_path: Path) -> None:
+    """Numba made a tuple of arrays after the handler had raised: a SystemError, or a crash."""
+    words = [sys.executable, "-c", STOPPED, str(written(tmp_path))]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=180, check=False)
+    assert (done.returncode, done.stdout) == (0, "stopped\n" * 3), done.stderr

@@ -19,7 +19,7 @@ from pneumo_ros.own_rig import loop
 from pneumo_ros.own_rig.description import Description, Start
 from pneumo_ros.own_rig.fmu import calls, exchange, stepping
 from pneumo_ros.own_rig.fmu.instance import MESSAGE, Instance, load
-from pneumo_ros.own_rig.kernel import SCALES, VALUES, Kernel, Names, kept_module
+from pneumo_ros.own_rig.kernel import SCALES, VALUES, Kernel, Names, kept_module, returning
 from pneumo_ros.own_rig.physics import Physics, check_slots
 from pneumo_ros.slots import flow as fl
 from pneumo_ros.slots import force as fo
@@ -49,10 +49,10 @@ def load_fmu(path: Path, rig: Description) -> tuple[Physics, Description]:
     inside = tuple(one.slot for one in rig.fmu.inside)
     names = Names(instance.variables.states, tuple(rig.inputs), tuple(rig.parameters), tuple(rig.channels),
                   tuple(slot.name for slot in inside))  # fmt: skip
-    module = _module(instance, len(names.channels))
+    module = _module(instance)
     nominal = np.array([q.value for q in rig.parameters.values()])
     whole = _started(instance, rig, nominal) if instance.variables.exchange else rig
-    runner = _Runner(instance, module, len(inside))
+    runner = _Runner(instance, module, len(names.channels), len(inside))
     mobility = None if instance.variables.exchange else runner.mobility
     kernel = Kernel(runner.run, runner.derivative, runner.coordinates, True, alone=True, mobility=mobility)
     _check(runner, instance, names, nominal)
@@ -79,13 +79,13 @@ def _check(runner: _Runner, instance: Instance, names: Names, nominal: Array) ->
                          remedy="check the parameters of the rig file, and that it runs elsewhere")  # fmt: skip
 
 
-def _module(instance: Instance, channels: int) -> ModuleType:
+def _module(instance: Instance) -> ModuleType:
     """Loop and calls as one file of the cache, named by all that they are made of."""
     rooms = (exchange, loop) if instance.variables.exchange else (stepping,)
     sources = [inspect.getsource(one) for one in rooms]
     made_of = hashlib.sha256("".join([*sources, *(inspect.getsource(one) for one in (calls, fo, fl))]).encode())
     lines = ["from __future__ import annotations", "from numba import njit", f"# made of {made_of.hexdigest()}",
-             f"CHANNELS = {channels}", COMPILED]  # fmt: skip
+             COMPILED]  # fmt: skip
     lines += [line for source in sources for line in source.splitlines()
               if not line.startswith(("from __future__", "from pneumo_ros.own_rig.bridge"))]  # fmt: skip
     text = "\n".join(lines) + "\n"
@@ -98,22 +98,23 @@ def _module(instance: Instance, channels: int) -> ModuleType:
 class _Runner:
     """Runs of one instance, one at a time."""
 
-    def __init__(self, instance: Instance, module: ModuleType, slots: int) -> None:
+    def __init__(self, instance: Instance, module: ModuleType, channels: int, slots: int) -> None:
         self.instance, self.module, self.slots, self.lock = instance, module, slots, Lock()
+        self._run = returning(module.run, channels)
         self._set: Array | None = None  # parameters that the instance has, outside a run
 
     def run(
         self, x0: Array, u: Array, held: Mask, period: float, substeps: int, p: Array, terms: Any, on: Any, P: Array,
         S: Array, since: float,
     ) -> tuple[Array, Array, Array]:  # fmt: skip
-        """As :func:`pneumo_ros.own_rig.loop.run`, from a fresh start of the instance."""
+        """As :attr:`pneumo_ros.own_rig.kernel.Kernel.run`, from a fresh start of the instance."""
         x0 = np.ascontiguousarray(x0, dtype=float)
         with self.lock:
             self._set = None
             handle = self.instance.begin(p, x0, u[0])
             if self.instance.variables.exchange:
                 u, held = np.column_stack([u, period * np.arange(len(u))]), np.append(held, False)
-            return self.module.run(x0, np.ascontiguousarray(u), held, period, substeps, handle, terms, on, P, S, since)
+            return self._run(x0, np.ascontiguousarray(u), held, period, substeps, handle, terms, on, P, S, since)
 
     def derivative(self, x: Array, u: Array, p: Array, f: Array, out: Array) -> None:
         """Rates of the states; 0 of a co-simulation, which keeps its own."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.own_rig.bridge import CHANNELS, compiled
+from pneumo_ros.own_rig.bridge import compiled
 from pneumo_ros.own_rig.fmu.calls import get2 as get_values
 from pneumo_ros.own_rig.fmu.calls import set2 as set_values
 from pneumo_ros.own_rig.fmu.calls import step2 as step
@@ -59,11 +59,10 @@ def evaluate(terms: Any, on: Any, P: Array, S: Array, c: Array, z: Array, f: Arr
 @compiled
 def run(
     x0: Array, u: Array, held: Any, period: float, substeps: int, p: Any, terms: Any, on: Any, P: Array, S: Array,
-    since: float,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Channels (N, C), coordinates (N, K, 3) and what acts (N, K); channels are NaN after a failure."""
+    since: float, out: Array, where: Array, acted: Array,
+) -> None:  # fmt: skip
+    """As :func:`pneumo_ros.own_rig.loop.run`; it ends with the row at which the FMU fails."""
     rows, slots = len(u), len(terms)
-    out, where, acted = np.full((rows, CHANNELS), np.nan), np.zeros((rows, slots, 3)), np.zeros((rows, slots))
     c, z, f = np.zeros((slots, 3)), np.zeros((slots, MEMORIES)), np.zeros(slots)
     inputs, h = np.zeros(len(held)), period / substeps
     for i in range(rows):
@@ -91,4 +90,3 @@ def run(
             out[i] = np.nan
             break
         where[i], acted[i] = c, f
-    return out, where, acted
