@@ -21,13 +21,17 @@ if TYPE_CHECKING:
 
 app = App(add_completion=False)
 SESSIONS = {"fit": (0, "D"), "held-out": (1, "C")}  # name -> what is added to the seed, class of the road
+LARGEST_SEED = 2**30 - 1  # sessions take 2 seed and 2 seed + 1, a node's parameter up to 2^31 - 1
 WHOLE = "the whole rig"
 RIG, ANSWER = "rig.yaml", "answer.json"  # in the sealed folder
 
 
 @app.command()
 def demo(
-    seed: Annotated[int, typer.Option(help="What is drawn: effect, place, size, the rig's own numbers, roads.")] = 1,
+    seed: Annotated[
+        int,
+        typer.Option(help="What is drawn: effect, place, size, the rig's own numbers, roads.", min=0, max=LARGEST_SEED),
+    ] = 1,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder, new; sessions/<time>-demo by default.")
     ] = None,

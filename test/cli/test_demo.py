@@ -33,6 +33,12 @@ def test_the_answer_is_sealed_before_anything_runs(tmp_path: Path) -> None:
         opened(answer, {"demo": digest})
 
 
+@pytest.mark.parametrize("seed", ["-1", str(2**30)])
+def test_a_seed_that_no_session_takes_is_refused_before_anything_is_written(tmp_path: Path, seed: str) -> None:
+    done = CliRunner().invoke(app, ["demo", "--seed", seed, "--output", str(tmp_path / "x")])
+    assert done.exit_code == 2 and "--seed" in done.output and not any(tmp_path.iterdir())
+
+
 def test_a_folder_that_is_there_is_not_touched(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["demo", "--output", str(tmp_path)])
     assert isinstance(done.exception, InputError) and "exists already" in str(done.exception)
