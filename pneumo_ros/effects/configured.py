@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pneumo_ros.effects.contract import Effect, ends_of
-from pneumo_ros.effects.loading import effect_in, load_library, origin_of
+from pneumo_ros.effects.loading import effect_in, laws_of, load_library, origin_of
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.errors import InputError
 from pneumo_ros.rig import NamedEffect, Rig
@@ -46,7 +46,7 @@ def with_files(rig: Rig, files: Sequence[str | Path]) -> Rig:
 def _active(one: NamedEffect, rig: Rig, library: Mapping[str, Effect]) -> Active:
     where, effect = f"effects of {rig.name}", library.get(one.effect)
     if effect is None:
-        raise InputError("unknown effect", where=where, key=one.effect, allowed=", ".join(library),
+        raise InputError("unknown effect", where=where, key=one.effect, allowed=", ".join(laws_of(library)),
                          remedy="give the Python file that defines it (--effect FILE), or a rig file with it beside it "
                                 "(--rig FILE.yaml); a log's own paths are never opened")  # fmt: skip
     _same_source(one, effect, where)

@@ -14,7 +14,7 @@ import inspect
 import pkgutil
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -60,18 +60,17 @@ def origins(library: Mapping[str, Effect]) -> list[str]:
     return [f"effect {name} is loaded from {o.file} (SHA-256 {o.digest[:16]})" for name, o in found if o is not None]
 
 
-def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) -> dict[str, Effect]:
+def load_library(paths: Sequence[str | Path] = ()) -> dict[str, Effect]:
     """All effects by id: the package's, those of installed entry points, then those in the given files.
 
     Parameters
     ----------
     paths : Python files that define ``EFFECT``; an id that exists already is replaced by the user's
-    without : ids to leave out
 
     Raises
     ------
     InputError
-        if a file cannot be loaded, defines no effect, or ``without`` names an unknown id.
+        if a file cannot be loaded, or defines no effect.
     """
     from pneumo_ros.effects.shapes.families import SHAPES
 
@@ -80,12 +79,7 @@ def load_library(paths: Sequence[str | Path] = (), without: Iterable[str] = ()) 
     found += SHAPES.values()
     found += [_installed(point) for point in entry_points(group=ENTRY_POINT_GROUP)]
     found += [effect_in(Path(path)) for path in paths]
-    effects = {effect.id: effect for effect in found}
-    for name in without:
-        if name not in effects:
-            raise InputError("unknown effect", key="without", value=name, allowed=", ".join(effects))
-        del effects[name]
-    return effects
+    return {effect.id: effect for effect in found}
 
 
 def own_ids(effects: Mapping[str, Effect]) -> list[str]:

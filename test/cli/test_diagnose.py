@@ -19,7 +19,7 @@ from pneumo_ros.cli.diagnose import _bench, app
 from pneumo_ros.diagnosis.half_car.from_logs import prepared
 from pneumo_ros.diagnosis.half_car.signals import read_signals
 from pneumo_ros.effects.composition import PlantTerm
-from pneumo_ros.effects.loading import load_library
+from pneumo_ros.effects.loading import laws_of, load_library
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
@@ -170,6 +170,13 @@ def test_an_output_that_cannot_be_written_is_said_before_the_work(tmp_path: Path
     ):
         done = CliRunner().invoke(app, [str(tmp_path / "nothing.mcap"), *options])
         assert isinstance(done.exception, InputError) and "nothing.mcap" not in str(done.exception)
+
+
+def test_of_effects_to_do_without_those_are_listed_that_a_verdict_may_name(short_log: Path) -> None:
+    with pytest.raises(InputError, match=r"unknown effect.*'leek'.*did you mean 'leak'") as told:
+        prepared([short_log], without=["leek"])
+    listed = str(told.value).partition("allowed: ")[2].partition(";")[0].split(", ")
+    assert listed == sorted(laws_of(load_library()))
 
 
 def test_a_log_given_twice_is_refused(tmp_path: Path) -> None:

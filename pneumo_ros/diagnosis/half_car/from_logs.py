@@ -27,9 +27,9 @@ from pneumo_ros.diagnosis.judge.outcome import Whereabouts
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.diagnosis.search.state import Progress
 from pneumo_ros.effects.configured import library_of, with_files
-from pneumo_ros.effects.loading import origins, own_ids
+from pneumo_ros.effects.loading import laws_of, origins, own_ids
 from pneumo_ros.effects.rig_model import RigModel
-from pneumo_ros.errors import InputError
+from pneumo_ros.errors import InputError, not_one_of
 from pneumo_ros.rig import Rig
 
 
@@ -89,7 +89,7 @@ def prepared(
     library = library_of(own, effects)
     for name in without:
         if name not in library:
-            raise InputError("unknown effect", key="without", value=name, allowed=", ".join(sorted(library)))
+            raise not_one_of("unknown effect", name, sorted(laws_of(library)), key="without")
     logs = [first, *(read_signals(path, rig) for path in fit[1:])]
     model = RigModel(own, library, frozenset(without))
     names = own_ids(library)
