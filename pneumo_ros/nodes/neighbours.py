@@ -18,14 +18,13 @@ from std_msgs.msg import String
 from pneumo_ros.errors import InputError
 from pneumo_ros.log.topics import CLOCK, EVERY_PERIOD, READY
 from pneumo_ros.nodes.qos import publisher_qos
-from pneumo_ros.nodes.sources import NAMELESS, node_of
+from pneumo_ros.nodes.sources import NAMELESS, NAMING, node_of
 from pneumo_ros.session.claim import Claim, taken
 
 # s. On one computer five looks of six see a publisher within 0.1 s; the sixth waits up to 3 s for an announcement.
 # Valves are worth the wait; in a simulation a publisher that was missed ends the session at its first message.
 LOOK_FOR = 0.5
 LOOK_FOR_BEFORE_VALVES = 3.2
-NAMED_WITHIN = 5.0  # s more for the names of publishers that were seen: one that was lost is repeated after 3 s
 STEP = 0.02  # s
 ISOLATED = range(1, 101)  # domains to isolate a session in; higher ones reach the ephemeral ports
 OWNED = (READY, CLOCK, *EVERY_PERIOD)
@@ -97,7 +96,7 @@ def neighbours(domain: int, namespace: str, look_for: float) -> list[str]:
         end = time.monotonic() + look_for
         while time.monotonic() < end:
             executor.spin_once(timeout_sec=STEP)
-        end += NAMED_WITHIN
+        end += NAMING
         while NAMELESS in {name for _, name in _publishers(node)} and time.monotonic() < end:
             executor.spin_once(timeout_sec=STEP)
         found = sorted({f"{publisher} publishes {topic}" for topic, publisher in _publishers(node)})

@@ -19,7 +19,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from pneumo_ros.log.topics import Topic
 
 NAMELESS = "a node without a name yet"
-NAMING = 2.0  # s a node may take to announce its name after its publisher; on an idle computer it takes 10 ms
+# s a node may take to announce its name after its publisher: 10 ms on an idle computer; an announcement that was lost
+# is repeated after 3 s
+NAMING = 4.0
 UNKNOWN = "_UNKNOWN_"  # part of rmw's name of a node that has announced its publisher but not yet itself
 
 
