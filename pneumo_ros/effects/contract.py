@@ -87,6 +87,8 @@ class Effect:
     guide : what people want to know of it
     slot, columns : of a shape, the term that it shares with others and which of its parameters are its own
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
+    taken : of a shape that may take its command at intervals, which of its parameters are the share that is taken so,
+        the interval and the phase
     elsewhere : places, ``{end}`` as above, where the same motion may come from: its name is held against what may act
         there in its stead (with "-": what ties two, or another thing at one); always where its motion tells nothing of
         the place (``always``), else where the structure leaves much
@@ -109,6 +111,7 @@ class Effect:
     slot: str = ""
     columns: tuple[int, ...] = ()
     screened: tuple[int, ...] = ()
+    taken: tuple[int, ...] = ()
     elsewhere: tuple[str, ...] = ()
     always: bool = False
     follows: float = 0.0

@@ -90,3 +90,10 @@ def with_earlier_jumps(record: Log, events: list[tuple[int, int]], lead: Array) 
     for (row, column), share in zip(events, lead, strict=True):
         commands[row - 1, column] += share * (record.commands[row, column] - record.commands[row - 1, column])
     return _replaced(record, commands=commands)
+
+
+def with_push(record: Log, column: int, rows: slice, amount: float) -> Log:
+    """The record with one command raised by ``amount``, m2, over some rows."""
+    commands = record.commands.copy()
+    commands[rows, column] += amount
+    return _replaced(record, commands=commands)

@@ -26,13 +26,14 @@ from pneumo_ros.effects.contract import (
     channels_of,
     ends_of,
 )
-from pneumo_ros.effects.drive import Drive, Log, coarsened, command_jumps, shifted, with_earlier_jumps
+from pneumo_ros.effects.drive import Drive, Log, coarsened, command_jumps, shifted, with_earlier_jumps, with_push
 from pneumo_ros.effects.loading import load_library
 from pneumo_ros.effects.nuisance import COMMAND_DELAY, NUISANCE, nominal_plant, nuisance_parameters, plant_with
 from pneumo_ros.effects.observed import ideal_channels, rates_of_channels, state_of
 from pneumo_ros.effects.parameters import Active, Curve, Parameter
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.effects.switches import Layout, kernel_of, layout_of, room_for_states, slots_of, switches_of
+from pneumo_ros.laws.filters import sampled_hold
 from pneumo_ros.plant.air_spring import AreaSurface, load_surface
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.integrator import simulate, substeps
@@ -42,6 +43,7 @@ from pneumo_ros.rig.channels import CHANNELS
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
 COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
 Memories = tuple[Memory, ...]  # one an effect; empty before the first block
+STILL = 1e-10  # m2
 PLANTS = 64  # kept at a time
 NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
@@ -228,6 +230,24 @@ class RigModel:
     def advanced(self, record: Log, events: list[tuple[int, int]], lead: Array) -> Log:
         """The record with jumps ``lead`` samples earlier: the row before takes that share of the jump."""
         return with_earlier_jumps(record, events, lead)
+
+    def columns(self, site: str) -> tuple[int, ...]:
+        """Columns of the commands of a site's inlets and outlets."""
+        return tuple(column for end in ends_of(site).columns for column in (end, 2 + end))
+
+    def amount(self, record: Drive, column: int) -> float:
+        """Standard deviation of a command, m2; 0 of one that only rounding moves."""
+        std = float(np.std(record.commands[:, column]))
+        return std if std > STILL else 0.0
+
+    def pushed(self, record: Log, column: int, first: int, last: int) -> Log:
+        """The record with one command raised by its :meth:`amount` over rows ``first`` to ``last`` - 1."""
+        return with_push(record, column, slice(first, last), self.amount(record, column))
+
+    def kept_off(self, record: Drive, column: int, interval: float, phase: float) -> Array:
+        """(N,) m2, by how much a command is off when a driver takes it every ``interval`` s and keeps it."""
+        commands = np.ascontiguousarray(record.commands[:, column])
+        return np.asarray(sampled_hold(commands, record.period, interval, phase)[0] - commands)
 
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""

@@ -183,6 +183,39 @@ def followed(u: Array, up: float, down: float, most: float, held: float) -> Arra
     return y
 
 
+@njit(cache=True, nogil=True)
+def taken(u: Array, begun: int, period: float, every: float, first: float, held: float) -> tuple[Array, float]:
+    """Mean over each period of a held signal (N,) that is taken at ``first`` and ``every`` so often from there, s, and
+    kept in between; ``begun`` rows came before.
+    """
+    y = np.empty_like(u)
+    for i in range(u.shape[0]):
+        start = (begun + i) * period
+        at = first + every * np.ceil((start - first) / every - 1e-9)
+        if at < start + period:
+            share = (at - start) / period
+            y[i] = held * share + u[i] * (1.0 - share)
+            held = u[i]
+        else:
+            y[i] = held
+    return y, held
+
+
+def sampled_hold(
+    u: Array, period: float, every: float, phase: float, memory: tuple[int, float] | None = None
+) -> tuple[Array, tuple[int, float]]:
+    """Mean over each period of a held signal that a part takes at intervals of its own and keeps until the next.
+
+    Parameters
+    ----------
+    every : s, no less than ``period``
+    phase : share of ``every`` that passes from the first row of all until the signal is first taken
+    """
+    begun, held = (0, float(u[0])) if memory is None else memory
+    y, held = taken(np.ascontiguousarray(u), begun, period, max(every, period), phase * every, held)
+    return y, (begun + len(u), held)
+
+
 def slewed(u: Array, most: float) -> Array:
     """What follows its input (N,) by at most so much a sample, from where that begins."""
     return np.asarray(followed(np.ascontiguousarray(u), 1.0, 1.0, most, float(u[0])))

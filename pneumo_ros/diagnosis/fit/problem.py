@@ -7,8 +7,8 @@ every log in prior sigmas, effect values in their typical sizes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -74,6 +74,8 @@ class Problem:
     fold : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
     tightness : times the weight that the tolerances of the nuisance parameters are told to have
+    scanned : start values, SI, of shapes that these logs were scanned for
+        (:mod:`pneumo_ros.diagnosis.search.intervals`)
     """
 
     model: Model
@@ -82,6 +84,7 @@ class Problem:
     fold: int = SELECT_EVERY - 1
     threads: int = 1
     tightness: float = 1.0
+    scanned: Mapping[Part, tuple[float, ...]] = field(default_factory=dict)
 
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
         """``work`` done on each item, in their order, several at a time."""
@@ -281,15 +284,22 @@ class Problem:
         """(n, C) as :meth:`predict`, from the coarse logs."""
         if self.coarse_records is None:
             return self.predict(candidate, x)
-        nuisance, active = self.nuisance(x), self.active(candidate, self.values(candidate, x))
-        out = []
-        for k, (record, whole) in enumerate(zip(self.coarse_records, self.records, strict=True)):
-            initial, std = self.model.initial(whole, active)
-            first = len(self.model.parameters) + k * self.states
-            initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
-            rows = self.model.predict(record, nuisance, initial, active)
-            out.append(self._averaged(k, between(rows, len(whole.measured))))
-        return np.vstack(out)
+        return np.vstack([self._from_coarse(k, r, candidate, x) for k, r in enumerate(self.coarse_records)])
+
+    def predict_log_coarse(self, k: int, record: Record, candidate: Candidate, x: Array) -> Array:
+        """(n_k, C) as :meth:`predict_log`, from the coarse log."""
+        if self.coarse_records is None:
+            return self.predict_log(k, record, candidate, x)
+        assert isinstance(self.model, HasCoarse)
+        return self._from_coarse(k, self.model.coarse(record), candidate, x)
+
+    def _from_coarse(self, k: int, record: Record, candidate: Candidate, x: Array) -> Array:
+        nuisance, active, whole = self.nuisance(x), self.active(candidate, self.values(candidate, x)), self.records[k]
+        initial, std = self.model.initial(whole, active)
+        first = len(self.model.parameters) + k * self.states
+        initial = initial + INITIAL_WIDENING * std * x[first : first + self.states]
+        rows = self.model.predict(record, nuisance, initial, active)
+        return self._averaged(k, between(rows, len(whole.measured)))
 
     def residual(self, candidate: Candidate, x: Array) -> Array:
         """(n, C) measured - predicted, in sigmas."""

@@ -31,10 +31,12 @@ from pneumo_ros.diagnosis.search.fitting import (
     short_fits,
     varied,
 )
+from pneumo_ros.diagnosis.search.intervals import intervals, sharpened
 from pneumo_ros.diagnosis.search.parts import rival, shaped
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
+    as_scanned,
     candidate_scores,
     compatible,
     trials,
@@ -78,10 +80,34 @@ def compete(problem: Problem, effort: Effort, pairs: bool, progress: Progress) -
     search.progress(0.55, "shapes")
     leading = shaped(search.problem, search.singles[:SHAPED])
     search.structures = [*leading, *_rivals_of_first(search)]
-    if pairs and search.singles and room_for_more(search) and not _one_suffices(search):
-        run_pairs(search)
-        _time_jumps(search)
+    if _much_missing(search):
+        _scan_intervals(search)
+        if pairs and _much_missing(search):
+            run_pairs(search)
+            _time_jumps(search)
     return search
+
+
+def _much_missing(search: Search) -> bool:
+    """Whether the best single leaves so much that more is worth looking for."""
+    return bool(search.singles) and room_for_more(search) and not _one_suffices(search)
+
+
+def _scan_intervals(search: Search) -> None:
+    """Parts that may take their command at intervals of their own, as these logs show them: a start for whoever fits
+    them from here on, and single effects.
+    """
+    search.progress(0.58, "scanning intervals")
+    base = refreshed(search.problem, search.refit)
+    found = intervals(search.problem, base)
+    if not found:
+        return
+    search.problem = replace(search.problem, scanned=found)
+    search.logged = replace(search.logged, scanned=found)
+    own = [one for one in (as_scanned(search.problem, law) for law in all_parts(search.problem)) if one is not None]
+    short = short_fits(search, base, own, (0.58, 0.6))
+    ended = search.problem.each(lambda one: finished(search.problem, one, search.effort), short)
+    search.structures += [sharpened(search.problem, one, search.effort.long) for one in ended]
 
 
 def _choose_fold(problem: Problem, refit: Fit) -> tuple[Problem, Fit]:

@@ -18,6 +18,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
+from pneumo_ros.diagnosis.search.intervals import sharpened
 from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, reduced, rival, shaped, shapes_of, with_shapes
 from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import (
@@ -73,6 +74,10 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
             _climb(search, refined, max(limits.second_cost, limits.second_share * best.samples))
         _end(search, _selected(search, limits))
     best = _selected(search, limits)
+    sharper = sharpened(search.problem, best.fit, search.effort.long)
+    if sharper is not best.fit:
+        search.structures.append(sharper)
+        best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
 

@@ -43,12 +43,33 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
     starts at the one that promises most.
     """
     candidate = Candidate((*one.candidate.parts, *parts))
-    values = list(problem.values(one.candidate, one.x))
+    values = problem.values(one.candidate, one.x).tolist()
     for part in parts:
         values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
-    start = problem.start(candidate, one.x[: problem.fixed], values)
-    found = fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
+    scanned = [part for part in parts if part in problem.scanned]
+    starts = [values, *(_scanned(problem, one, part, parts, values) for part in scanned)]
+
+    def fitted(values: Sequence[float]) -> Fit:
+        start = problem.start(candidate, one.x[: problem.fixed], values)
+        return fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
+
+    found = min(problem.each(fitted, starts), key=lambda other: other.cost)
     return found if found.cost < one.cost else one
+
+
+def _scanned(problem: Problem, one: Fit, shape: Part, parts: Sequence[Part], values: Sequence[float]) -> list[float]:
+    """Start values of a structure with further parts, one of which is a shape that the logs were scanned for: it does
+    then what its family's laws did, and these start at nothing.
+    """
+    out, first = list(values), 0
+    for part in (*one.candidate.parts, *parts):
+        own = problem.parameters_of[part]
+        if part == shape:
+            out[first : first + len(own)] = problem.scanned[shape]
+        elif part[1] == shape[1] and family_of(part[0]) == family_of(shape[0]):
+            out[first : first + len(own)] = [0.0 if p.size else v for p, v in zip(own, out[first:], strict=False)]
+        first += len(own)
+    return out
 
 
 def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:

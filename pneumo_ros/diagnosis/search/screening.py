@@ -81,8 +81,16 @@ def all_parts(problem: Problem) -> list[Part]:
 
 
 def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
-    """Simulate each part at each start on top of a fit, coarsely where that will do; what diverges or moves nothing is
-    left out.
+    """Each part at each start on top of a fit; what diverges or moves nothing is left out."""
+    starts = [start for part in parts for start in _starts(problem, part)]
+    return [trial for trial in changes(problem, base, starts) if trial is not None]
+
+
+def changes(
+    problem: Problem, base: Fit, starts: Iterable[tuple[tuple[Part, ...], tuple[float, ...]]]
+) -> list[Trial | None]:
+    """Parts with start values simulated on top of a fit, coarsely where that will do; None for what diverges or moves
+    nothing.
     """
     own = list(problem.values(base.candidate, base.x))
     here = problem.predict_coarse(base.candidate, base.x)
@@ -98,8 +106,7 @@ def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
         seen = np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6
         return Trial(added, values, change) if seen else None
 
-    starts = [start for part in parts for start in _starts(problem, part)]
-    return [trial for trial in problem.each(tried, starts) if trial is not None]
+    return problem.each(tried, starts)
 
 
 def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[float, ...]]]:
@@ -116,7 +123,17 @@ def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[
             for m, p in enumerate(atoms):
                 if not p.size:
                     out += [((part, shape), (*still, *alone[:m], value, *alone[m + 1 :])) for value in p.starts]
-    return out
+    scanned = as_scanned(problem, part)
+    return out if scanned is None else [*out, (scanned.parts, scanned.values)]
+
+
+def as_scanned(problem: Problem, law: Part) -> CandidateScore | None:
+    """A law at nothing with its family's shape as the logs were scanned for it; None where they were not."""
+    shape = (f"{family_of(law[0])}.{SHAPE}", law[1])
+    if shape not in problem.scanned:
+        return None
+    still = (0.0 if p.size else p.typical for p in problem.parameters_of[law])
+    return CandidateScore((law, shape), (*still, *problem.scanned[shape]), 0.0)
 
 
 def candidate_scores(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[CandidateScore]:
@@ -141,7 +158,7 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     The largest over its sites and starts; 0 where no trial moved anything. What is far below one could not have been
     seen.
     """
-    gram, _, _ = _projected(problem, base, found, held=False)
+    gram, _, _ = projected(problem, base, found, held=False)
     count = float(np.count_nonzero(problem.weight[problem.fitted]))
     out = dict.fromkeys(filter(is_law, problem.model.effects), 0.0)
     for trial, square in zip(found, np.diag(gram), strict=True):
@@ -153,7 +170,7 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
 def _candidate_scores(
     problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool
 ) -> list[CandidateScore]:
-    gram, with_residual, total = _projected(problem, base, found, held)
+    gram, with_residual, total = projected(problem, base, found, held)
     signed = np.array([_signed(problem, trial) for trial in found], dtype=bool)
     explained = _explained_by_pairs if pairs else _explained_alone
     share, sizes, members = explained(gram, -with_residual, signed)
@@ -197,8 +214,8 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
     )
 
 
-def _projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
-    """Gram matrix of the changes and their products with the residual, both free of what the base's unknowns can do."""
+def projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
+    """Gram matrix of the trials' changes and their products with the residual, both free of what the base can do."""
     assert base.jacobian is not None
     rows = problem.fitted
     r = base.residual[rows]

@@ -28,7 +28,7 @@ from pneumo_ros.effects.contract import (
 )
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, amplitude
-from pneumo_ros.laws.filters import delayed_hold, first_order_line, followed, lagged_hold, play, stick
+from pneumo_ros.laws.filters import delayed_hold, first_order_line, followed, lagged_hold, play, sampled_hold, stick
 from pneumo_ros.laws.signal import bent, crept, dead
 from pneumo_ros.rig.channels import DISPLACEMENTS
 
@@ -73,6 +73,10 @@ def _stick(band: float) -> Filter:
     return lambda u, period, memory: stick(u, band, memory)
 
 
+def _take(every: float, phase: float) -> Filter:
+    return lambda u, period, memory: sampled_hold(u, period, every, phase, memory)
+
+
 def _follow(slew: float, rising: float, falling: float) -> Filter:
     """A part of first order, with a lag on the way up and another on the way down, no faster than ``slew``."""
 
@@ -106,9 +110,9 @@ def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParam
 
 def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
            fitted: tuple[EffectParameter, ...] = (), made: Callable[..., Filter] | None = None,
-           alone: bool = False) -> Effect:  # fmt: skip
+           alone: bool = False, taken: bool = False) -> Effect:  # fmt: skip
     """A valve's shape; one filter whose numbers are fitted is ``made`` of the last parameters, after its share, and
-    tried ``alone`` as well.
+    tried ``alone`` as well, or scanned for where these are an interval and a phase (``taken``).
     """
 
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -122,7 +126,8 @@ def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filt
 
     parameters = (*_shares(names, name.startswith("anything")), *fitted)
     screened = (len(names),) if alone else ()
-    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened)
+    at = (len(names), len(names) + 1, len(names) + 2) if taken else ()
+    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened, taken=at)
 
 
 def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -223,11 +228,14 @@ SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 STICKING = (*_shares(["sticking"]),
             EffectParameter("band", "m2", 1e-8, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
+TAKING = (*_shares(["taken"]), EffectParameter("interval", "s", 4e-3, 0.25, 0.05, spread=10.0),
+          EffectParameter("phase", "1", 0.0, 1.0, 0.5, spread=10.0))  # fmt: skip
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
            [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
            _follower("m2/s", 1.5e-6, 3e-5), _follow),
-    _valve("transport_delay.shape", "commands that come late by delays of many lengths", DELAY_NAMES, LATE, False),
+    _valve("transport_delay.shape", "commands that come late by delays of many lengths, or at a driver's intervals",
+           DELAY_NAMES, LATE, False, TAKING, _take, taken=True),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play, or a spool that sticks and jumps",
            ZONE_NAMES, ZONES, True, STICKING, _stick, alone=True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
