@@ -24,6 +24,7 @@ def test_a_shape_that_does_nothing_leaves_the_librarys_law(share: float, law: st
     model = RigModel(load_rig())
     problem = Problem(model, (log(model, 1, None, (Active("transport_delay", "both", (0.015,)),)),))
     candidate = Candidate(LATE)
-    found = fit(problem, candidate, problem.start(candidate, None, [0.015, 0.0, 0.0, share, 0.0, 0.0, 0.0, 0.05, 0.5]), iterations=0)
+    start = problem.start(candidate, None, [0.015, 0.0, 0.0, share, 0.0, 0.0, 0.0, 0.05, 0.5])
+    found = fit(problem, candidate, start, iterations=0)
     entry = BudgetEntry(("transport_delay",), "both", AIR, 0.4, (0.3, 0.5), DIFFERS, 0.93)
     assert [one.law for one in with_own_laws(problem, found, [entry])] == [law]
