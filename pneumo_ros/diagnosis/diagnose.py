@@ -34,6 +34,7 @@ from pneumo_ros.diagnosis.result import Diagnosis, Gap
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.growth import grow
+from pneumo_ros.diagnosis.search.intervals import interval_words
 from pneumo_ros.diagnosis.search.parts import reduced
 from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, null_thresholds, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Progress, Search
@@ -364,7 +365,7 @@ def _next_experiment(
 
 
 def _notes(search: Search, best: Fit, problem: Problem) -> list[str]:
-    notes = [f"{label}: the fit diverged, the candidate lost" for label in search.lost]
+    notes = [*interval_words(problem, best), *(f"{one}: the fit diverged, the candidate lost" for one in search.lost)]
     low, high = problem.bounds(best.candidate)
     for m, p in enumerate(problem.model.parameters):
         if best.x[m] in (low[m], high[m]):

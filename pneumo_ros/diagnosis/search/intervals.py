@@ -22,7 +22,7 @@ from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, level
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.screening import Trial, changes, projected
-from pneumo_ros.effects.parameters import EffectParameter
+from pneumo_ros.effects.parameters import family_of
 
 MOMENT: Final = 0.05  # s that a push lasts: of a rig that sums up flows more is not seen [numerics]
 PHASES: Final = 8  # tried of each interval [numerics]
@@ -160,25 +160,42 @@ def _simulated(
     return runs[best].values if explained[best] > 0.0 else None
 
 
+def taken_at(problem: Problem, found: Fit) -> list[tuple[Part, list[int]]]:
+    """Shapes of a fit that take most of their command at intervals, with where interval and phase stand in its
+    unknowns.
+    """
+    out, first = [], problem.fixed
+    for part in found.candidate.parts:
+        effect, own = problem.model.effects[part[0]], problem.parameters_of[part]
+        if isinstance(effect, TakesAtIntervals) and effect.taken:
+            share, *which = effect.taken
+            if found.x[first + share] * own[share].typical > MOSTLY:
+                out.append((part, [first + k for k in which]))
+        first += len(own)
+    return out
+
+
+def interval_words(problem: Problem, found: Fit) -> list[str]:
+    """What a fit says of each part that takes its command at intervals."""
+    values = problem.values(found.candidate, found.x)
+    return [f"{family_of(name).replace('_', ' ')}{f' ({site})' if site else ''}: the command is taken every "
+            f"{1e3 * float(values[which[0] - problem.fixed]):.3g} ms and kept until the next time"
+            for (name, site), which in taken_at(problem, found)]  # fmt: skip
+
+
 def sharpened(problem: Problem, found: Fit, iterations: int) -> Fit:
     """A fit whose intervals and phases are those near its own that leave least, fitted on from there: a command that
     steps is taken before or after a step, and no gradient leads from the one to the other.
     """
-    best, first = found, problem.fixed
-    for part in found.candidate.parts:
-        effect, own = problem.model.effects[part[0]], problem.parameters_of[part]
-        if isinstance(effect, TakesAtIntervals) and effect.taken:
-            share, *which = (first + k for k in effect.taken)
-            if best.x[share] * own[effect.taken[0]].typical > MOSTLY:
-                best = _sharpened(problem, best, which, [own[k] for k in effect.taken[1:]], iterations)
-        first += len(own)
+    best = found
+    for _, which in taken_at(problem, found):
+        best = _sharpened(problem, best, which, iterations)
     return best
 
 
-def _sharpened(
-    problem: Problem, found: Fit, which: Sequence[int], own: Sequence[EffectParameter], iterations: int
-) -> Fit:
-    scale = np.array([p.typical for p in own])
+def _sharpened(problem: Problem, found: Fit, which: Sequence[int], iterations: int) -> Fit:
+    parameters = problem.effect_parameters(found.candidate)
+    scale = np.array([parameters[k - problem.fixed].typical for k in which])
 
     def left(x: Array) -> float:
         return level(problem.residual(found.candidate, x)[problem.fitted])

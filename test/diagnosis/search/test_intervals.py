@@ -12,7 +12,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, refreshed
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.fitting import by_cost
-from pneumo_ros.diagnosis.search.intervals import intervals
+from pneumo_ros.diagnosis.search.intervals import interval_words, intervals
 from pneumo_ros.diagnosis.search.parts import with_shapes
 from pneumo_ros.diagnosis.search.screening import as_scanned
 from pneumo_ros.diagnosis.search.selection import score
@@ -75,6 +75,9 @@ def test_a_scanned_driver_explains_the_log_to_its_noise() -> None:
     values = search.problem.values(best.candidate, best.x)
     found = dict(zip((p.name for p in parameters), map(float, values), strict=True))
     assert found["interval"] == pytest.approx(INTERVAL, rel=1e-3)
+    (words,) = interval_words(search.problem, best)
+    assert words == "transport delay (front): the command is taken every 71.3 ms and kept until the next time"
+    assert interval_words(search.problem, search.refit) == []
     assert found["delay"] + sum(v for name, v in found.items() if name.startswith("delay 0")) < 0.1
 
 
