@@ -185,8 +185,8 @@ def followed(u: Array, up: float, down: float, most: float, held: float) -> Arra
 
 @njit(cache=True, nogil=True)
 def taken(u: Array, begun: int, period: float, every: float, first: float, held: float) -> tuple[Array, float]:
-    """Mean over each period of a held signal (N,) that is taken at ``first`` and ``every`` so often from there, s, and
-    kept in between; ``begun`` rows came before.
+    """Mean over each row, ``period`` s, of a held signal (N,) that is taken at ``first`` and every ``every`` s from
+    there, and kept in between; ``begun`` rows came before.
     """
     y = np.empty_like(u)
     for i in range(u.shape[0]):
