@@ -122,6 +122,21 @@ def test_a_sensor_with_another_sensitivity_on_one_side_of_its_rest(channel: int)
     assert np.allclose(error, 0.2 * np.maximum(reading[:, channel] - RESTS[channel], 0.0), atol=1e-9 * swing)
 
 
+@pytest.mark.parametrize("channel", [1, 5])
+def test_a_sensors_curve_bends_no_further_from_its_end_on_and_its_slope_goes_on(channel: int) -> None:
+    name = "pressure_scale.shape" if channel > 3 else "lvdt_scale.shape"
+    shape, swing = SHAPES[name], 5e4 if channel > 3 else 0.01
+    reading = np.zeros((301, 6))
+    z = np.linspace(-3.0, 3.0, 301)
+    reading[:, channel] = RESTS[channel] + swing * z
+    of_name = {"error of power 1": 0.1, "error of power 3": 0.2, "end of the curve": 1.5}
+    values = tuple(of_name.get(p.name, 0.0) for p in shape.parameters)
+    assert shape.outputs is not None
+    shown, _ = shape.outputs(reading, PERIOD, (channel,), values, None)
+    error = (shown[:, channel] - reading[:, channel]) / swing
+    assert np.allclose(error, 0.1 * z + 0.2 * np.clip(z, -1.5, 1.5) ** 3, atol=1e-9)
+
+
 def test_a_valve_that_opens_slowly_and_closes_at_once() -> None:
     shape = SHAPES["valve_lag.shape"]
     opened = np.r_[np.zeros(50), np.full(200, 1e-6), np.zeros(200)]

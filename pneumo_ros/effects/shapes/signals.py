@@ -4,8 +4,8 @@
 A slow part is a mixture of lags and delays with nonnegative shares, and one follower whose rate limit and two lags are
 fitted (mixtures of limits are not like a limit between them); a dead zone takes away ramps that end at a corner, and
 what a play of some width does not pass, and one spool that sticks and jumps, whose band is fitted for the same reason;
-a sensor's error is a polynomial of its own reading; its zero creeps from where it stood when the log began, by
-exponentials of every length.
+a sensor's error is a polynomial of its own reading that ends somewhere, with kinks; its zero creeps from where it stood
+when the log began, by exponentials of every length.
 """
 
 from __future__ import annotations
@@ -48,6 +48,10 @@ RESTS = (0.0291, 0.0207, -0.0166, -0.0250, 2.77e5, 4.29e5)  # m, Pa absolute: CH
 PRESSURE_SWING, LVDT_SWING = 5e4, 0.01  # Pa, m: of a session
 KINKED = "scale above 0"
 KINKS = (0.0, 1.0)  # swings from the rest beyond which a sensor may have another sensitivity
+STRAIGHT = 2  # powers from which on a sensor's curve ends: what is straight goes on
+# Swings from the rest beyond which a sensor's curve bends no further: a polynomial has no bounds where no fitted log
+# has been, a sensor's error has
+CURVE_END = EffectParameter("end of the curve", "1", 0.4, 4.0, 1.0, ends=(0.4, 4.0), spread=10.0)
 CREEPS = (1.0, 4.0, 15.0, 60.0)  # s; the longest is a straight line in most logs
 CREEPS_TRIED = (1, 3)  # which of them are tried alone
 LVDT_CREEP, PRESSURE_CREEP = 1e-3, 5e3  # m, Pa: where a creeping zero typically ends
@@ -143,9 +147,12 @@ def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: M
 
 
 def _static_error(x: Array, rest: float, swing: float, powers: Sequence[int], values: Values) -> Array:
-    """A sensor's error over its own reading, in the reading's unit: a polynomial about the rest, with kinks."""
-    z = (x - rest) / swing
-    out = bent(z, powers, values)
+    """A sensor's error over its own reading, in the reading's unit: a polynomial about the rest that bends no further
+    from its end on, with kinks.
+    """
+    z, end = (x - rest) / swing, values[len(powers) + 2 * len(KINKS)]
+    out = bent(z, powers[:STRAIGHT], values[:STRAIGHT])
+    out += bent(np.clip(z, -end, end), powers[STRAIGHT:], values[STRAIGHT : len(powers)])
     for k, kink in enumerate(KINKS):
         above, below = values[len(powers) + 2 * k : len(powers) + 2 * k + 2]
         if above != 0.0 or below != 0.0:
@@ -156,7 +163,8 @@ def _static_error(x: Array, rest: float, swing: float, powers: Sequence[int], va
 def _sensor(name: str, summary: str, sites: tuple[str, ...], swing: float, powers: Sequence[int],
             lags: Sequence[float], follower: tuple[EffectParameter, ...] = ()) -> Effect:  # fmt: skip
     kinks = [f"{way} {kink:g}" for kink in KINKS for way in ("above", "below")] if powers else []
-    count = len(powers) + len(kinks)
+    ended = (CURVE_END,) if powers else ()
+    count = len(powers) + len(kinks) + len(ended)
     some = count + len(lags) + (1 if follower else 0)
 
     def error(x: Array, channel: int, values: Values) -> Array:
@@ -189,7 +197,7 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], swing: float, power
     alone = tuple(k for k, atom in enumerate(atoms) if atom.name in ("error of power 2", "error of power 3", KINKED))
     every_sign = name.startswith("anything")
     own = _shares([f"lag {t:g} s" for t in lags], every_sign)
-    parameters = (*(amplitude(atom) for atom in atoms), *own, *follower)
+    parameters = (*(amplitude(atom) for atom in atoms), *ended, *own, *follower)
     return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo, screened=alone)
 
 
