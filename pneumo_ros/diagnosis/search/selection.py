@@ -42,6 +42,7 @@ NULL_QUANTILE: Final = 0.95
 THIRD: Final = 3  # effects from which on the fitted samples count as the kept ones do [taste]
 # Log weight that each unknown used costs: what could fit anything proves less [calibration: set 0.4, opened]
 PER_UNKNOWN: Final = 1.0
+FAR: Final = 3.0  # log weight by which a fit of the same laws must be likelier than the one of lowest price [taste]
 
 
 @dataclass(frozen=True)
@@ -208,6 +209,16 @@ def by_families(structures: Sequence[Scored]) -> dict[frozenset[str], list[Score
         first = min((one for one in group if one.price < group[0].price + EVEN), key=lambda one: one.level)
         group.sort(key=lambda one: one is not first)  # the others stay in their order
     return groups
+
+
+def best_of_same(refit: Scored, fits: Sequence[Scored]) -> Scored:
+    """Of fits with the same laws, with and without shapes, the one of lowest price, and a law alone before one with its
+    shape that does as well; another one only where it is likelier by :data:`FAR`: a fit may end where it serves nothing
+    but the samples that it was fitted to.
+    """
+    ordered = sorted(fits, key=lambda one: one.price + len(one.fit.candidate.shapes))
+    other = max(ordered, key=lambda one: log_weight(one, refit))
+    return other if log_weight(other, refit) > log_weight(ordered[0], refit) + FAR else ordered[0]
 
 
 def likeliest(refit: Scored, rivals: Sequence[Scored]) -> Scored:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from pneumo_ros.diagnosis.fit.needed import needed_unknowns
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
 from pneumo_ros.diagnosis.search.screening import CandidateScore
-from pneumo_ros.diagnosis.search.selection import PARAMETER_PENALTY
+from pneumo_ros.diagnosis.search.selection import best_of_same, score
 
 Progress = Callable[[float, str], None]  # share done 0..1, what is being done
 
@@ -73,13 +72,14 @@ class Search:
 
     @property
     def finalists(self) -> list[Fit]:
-        """Every converged structure; of those with the same laws, with and without shapes, the one of lowest price."""
-        best: dict[tuple[Part, ...], Fit] = {}
+        """Every converged structure; of those with the same laws, with and without shapes, the best."""
+        same: dict[tuple[Part, ...], list[Fit]] = {}
         for one in (*self.laws, *self.structures):
-            rival = best.get(one.candidate.laws)
-            if rival is None or _price(self.problem, one) < _price(self.problem, rival):
-                best[one.candidate.laws] = one
-        return list(best.values())
+            same.setdefault(one.candidate.laws, []).append(one)
+        return [fits[0] if len(fits) == 1 else self._best_of(fits) for fits in same.values()]
+
+    def _best_of(self, fits: Sequence[Fit]) -> Fit:
+        return best_of_same(score(self.problem, self.refit), [score(self.problem, one) for one in fits]).fit
 
     @property
     def laws(self) -> list[Fit]:
@@ -90,8 +90,3 @@ class Search:
     def best(self) -> Fit:
         """Lowest training cost of all."""
         return min([self.refit, *self.finalists], key=lambda f: f.cost)
-
-
-def _price(problem: Problem, one: Fit) -> float:
-    """Training cost with the penalty of what was fitted, and a little for each shape: a law that does as well wins."""
-    return one.cost + PARAMETER_PENALTY * needed_unknowns(problem, one, PARAMETER_PENALTY) + len(one.candidate.shapes)

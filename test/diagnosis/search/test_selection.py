@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from helpers.structures import scored
 
-from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, log_weight, select
+from pneumo_ros.diagnosis.search.selection import Scored, Thresholds, best_of_same, log_weight, select
 
 LIMITS = Thresholds()
 
@@ -30,6 +30,24 @@ def test_of_laws_that_cost_as_much_the_kept_blocks_choose() -> None:
     right = scored(0.25, -600.0, "coulomb_friction.soft")
     assert select(refit, [stuck, right], LIMITS) is right
     assert select(refit, [scored(2.93, -605.0, "coulomb_friction.presliding"), right], LIMITS) is not right
+
+
+def test_of_the_same_laws_a_dearer_fit_is_taken_where_it_is_likelier_by_far() -> None:
+    """A delay whose fit ends 110 cheaper on the fitted samples leaves 72 sigma squared of the kept ones, another 29."""
+    refit = scored(900.0, 9000.0)
+    cheap = replace(scored(72.0, 937.0, "transport_delay"), fitted=4.0)
+    kept = replace(scored(29.5, 1048.0, "transport_delay"), fitted=4.6)
+    assert best_of_same(refit, [cheap, kept]) is kept
+    close = replace(kept, level=68.0)
+    assert best_of_same(refit, [close, cheap]) is cheap
+
+
+def test_of_the_same_laws_the_law_alone_is_taken_where_its_shape_does_no_better() -> None:
+    refit, law = scored(900.0, 9000.0), scored(2.0, 100.0, "leak")
+    shaped = scored(2.0, 99.5, "leak", "leak.shape")
+    assert shaped.fit.candidate.laws == law.fit.candidate.laws
+    assert best_of_same(refit, [shaped, law]) is law
+    assert best_of_same(refit, [replace(shaped, fit=replace(shaped.fit, cost=90.0)), law]) is not law
 
 
 @pytest.mark.parametrize("kept, fitted, taken", [(0.2, 0.5, True), (0.2, 0.3, False), (0.1, 0.9, False)])
