@@ -12,7 +12,8 @@ opening : pressure above which something opens
 error, slope, over : share by which a flow is off, how it grows, and over which distance from where it is stated
 flow : what flows on purpose, any unit
 exponent : of a flow over the difference of pressures
-left, time : share of a settling that is still to come, and its time constant, s
+left, time : share of a settling that is still to come, and its time constant, s; of a filling, what it would take at
+    the rate that it has at a difference of ``scale``
 per : of :func:`gap_over_hole`, :func:`alike_at`
 """
 
@@ -87,3 +88,12 @@ def in_excess(flow: float, error: float, slope: float, over: float) -> float:
 def settling(left: float, time: float) -> float:
     """Rate of what settles exponentially, for one unit of it."""
     return left / time
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def filling(up: float, down: float, scale: float, time: float) -> float:
+    """Rate of the pressure in a vessel that is filled, or emptied, through an orifice: with the root of the difference,
+    linear where that is well below 4 % of the scale.
+    """
+    d = up - down
+    return d / (time * math.sqrt(abs(d) / scale + 0.04))

@@ -3,7 +3,8 @@
 
 A mass flow W adds n R T/V W to dP/dt (Eq. 4.22), heat Q adds (n - 1)/V Q; an exponent n - D for slow strokes is
 a heat of D/(n - 1) P dV/dt (Quaglia and Sorli 2001). An orifice that ices or clogs passes a share of its flow less, the
-more the longer the session lasts.
+more the longer the session lasts. A second chamber, rigid and behind an opening of its own, takes V/(n R T) times the
+rate of its own pressure.
 
 Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 """
@@ -20,7 +21,7 @@ from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.library.leak import LAMINAR, REFERENCE
 from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, Term
-from pneumo_ros.laws.flow import gap_over_hole, relieved
+from pneumo_ros.laws.flow import filling, gap_over_hole, relieved
 from pneumo_ros.laws.memory import relaxed
 from pneumo_ros.plant.air_spring import MEAN_AREA
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, INCH
@@ -35,6 +36,8 @@ MEMORIES = (0.15, 0.8, 4.0)  # s, of the wall's own temperature
 KNEES = (0.3, 0.5)  # pressure ratios from which an inlet's flow may fall in another way
 BENT = 0.3  # pressure ratio past a knee at which its atom changes the flow by its amplitude
 SETTLES = (3.0, 12.0)  # s after a session's begin in which an orifice changes, as by ice
+DROP = 1e4  # Pa between spring and second chamber at which the time that it takes to fill is stated
+QUICKEST = 5e-3  # s, of that time: a chamber that is quicker is part of the volume
 
 ATOMS: tuple[Atom | EffectParameter, ...] = (
     Atom("leak hole", "m2", 2e-7),
@@ -58,8 +61,10 @@ ATOMS: tuple[Atom | EffectParameter, ...] = (
     *(Atom(f"exponent {v:g} m/s", "1", 0.03) for v in SLOW),
     *(Atom(f"later {where} {t:g} s", "1", 0.05) for where in ("outlet", "inlet") for t in SETTLES),
     *(Atom(f"inlet past {ratio:g}", "1", 0.05, signed=True) for ratio in KNEES),
+    Atom("chamber", "m3", 3e-5),
+    EffectParameter("fills in", "s", QUICKEST, 1.0, 0.03, starts=(0.008, 0.2), spread=10.0),
 )
-State = tuple[float, float, float, float, float, float, float]
+State = tuple[float, float, float, float, float, float, float, float]
 Values = tuple[float, ...]
 # A shape is no law whose last digit means anything: sums in any order, divisors turned over once, half the time.
 LOOSE = {"arcp", "contract", "reassoc"}
@@ -67,20 +72,26 @@ LOOSE = {"arcp", "contract", "reassoc"}
 
 @njit(cache=True, error_model="numpy")
 def start(strut: Strut, air: Air, tyre: Tyre, p: Values) -> State:
-    """Air and wall at the supply's temperature, orifices as they were, and the pressure that the session began with."""
-    t = air.temperature
-    return (air.pressure * air.volume / (GAS_CONSTANT * air.supply_temperature), t, t, t, 0.0, 0.0, air.pressure)
+    """Air and walls at the supply's temperature, orifices as they were, the pressure that the session began with, and
+    the second chamber at it.
+    """
+    t = air.supply_temperature
+    return (air.pressure * air.volume / (GAS_CONSTANT * t), t, t, t, 0.0, 0.0, air.pressure, air.pressure)
 
 
 @njit(cache=True, error_model="numpy", fastmath=LOOSE)
 def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) -> State:
-    """The air's mass by its flows, the walls that follow its temperature, and orifices that change with time."""
-    t = air.temperature
+    """The air's mass by its flows, the walls that follow its temperature, orifices that change with time, and the
+    chamber's pressure, which no step carries beyond the spring's.
+    """
+    t = air.pressure * air.volume / (GAS_CONSTANT * z[0])
+    gap = air.pressure - z[7]
+    move = dt * filling(air.pressure, z[7], DROP, max(p[28], QUICKEST))
     return (
         max(z[0] + dt * (air.inflow - air.outflow), 1e-7), relaxed(z[1], t, dt, MEMORIES[0]),
         relaxed(z[2], t, dt, MEMORIES[1]), relaxed(z[3], t, dt, MEMORIES[2]),
         relaxed(z[4], 1.0, dt, SETTLES[0]), relaxed(z[5], 1.0, dt, SETTLES[1]),
-        z[6],
+        z[6], z[7] + (max(move, gap) if gap < 0.0 else min(move, gap)),
     )  # fmt: skip
 
 
@@ -99,9 +110,10 @@ def air(air: Air, z: State, p: Values) -> float:
     flow += p[18] + air.inflow * (p[23] * z[4] + p[24] * z[5]) - air.outflow * (p[21] * z[4] + p[22] * z[5])
     true = air.pressure * air.volume / (GAS_CONSTANT * z[0])
     heat = (p[9] + p[10] * pressure) * (air.supply_temperature - true)
-    heat += p[11] * (z[1] - t) + p[12] * (z[2] - t) + p[13] * (z[3] - t)
+    heat += p[11] * (z[1] - true) + p[12] * (z[2] - true) + p[13] * (z[3] - true)
     heat += p[14] * HEAT_CAPACITY * air.inflow * (air.supply_temperature - t)
     through = GAS_CONSTANT * t
+    flow -= p[27] * filling(air.pressure, z[7], DROP, max(p[28], QUICKEST)) / (air.exponent * through)
     squeezed, v = air.pressure * MEAN_AREA * air.rate, air.rate * air.rate
     nominal = air.exponent * (through * (air.inflow - air.outflow) - squeezed) / air.volume
     extra = p[15] + p[16] * (air.height - MIDDLE) / SWING + p[17] * (pressure - 1.0)
@@ -109,7 +121,7 @@ def air(air: Air, z: State, p: Values) -> float:
     return (air.exponent * through * flow + (air.exponent - 1.0) * heat) / air.volume - extra * nominal
 
 
-AIR = Term("air", PlantTerm(states=7, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
+AIR = Term("air", PlantTerm(states=8, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
     # Holes and gaps are the law's; an area that the two share is no size to tell.
     AIR.shape("leak", ["leak that opens", "opens"], "a leak that opens", alone=("leak that opens",)),
@@ -120,7 +132,12 @@ EFFECTS = (
         "heat from the wall and with the inflow, of any law",
         alone=("exponent",),
     ),
-    AIR.shape("dead_volume", ["volume"], "a volume that is not V(h), of any law"),
+    AIR.shape(
+        "dead_volume",
+        ["volume", "chamber", "fills in"],
+        "a volume that is not V(h), of any law, or a second chamber",
+        alone=("chamber",),
+    ),
     AIR.anything(),
     AIR.anything("later", ["later"]),
 )

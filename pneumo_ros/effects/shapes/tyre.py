@@ -35,6 +35,7 @@ ATOMS = (
     *(Atom(f"lift below {100.0 * c:g} %", "N/m", 500.0) for c in LIFTS),
     Atom("progressive", "N/m", 500.0),
     Atom("constant", "N/m", 100.0, signed=True),
+    *(Atom(f"loss over load to the {power}", "N s/m", 20.0) for power in (2, 3)),
 )
 State = tuple[float, float]
 Values = tuple[float, ...]
@@ -51,8 +52,9 @@ def advance(z: State, strut: Strut, air: Air, tyre: Tyre, dt: float, p: Values) 
 def tyre(tyre: Tyre, z: State, p: Values) -> float:
     """Sum of the atoms."""
     v, c, rest, r = tyre.rate, tyre.compression, tyre.rest, PER_RATE
+    loaded = max(0.0, c) * PER_LOADED
     out = linear(v, p[0]) + p[1] * clipped(v * r[0], 1.0) + p[2] * clipped(v * r[1], 1.0)
-    out += p[3] * v * max(0.0, c) * PER_LOADED + p[4] * z[0] + p[5] * z[1]
+    out += v * loaded * (p[3] + loaded * (p[15] + loaded * p[16])) + p[4] * z[0] + p[5] * z[1]
     out += p[6] * max(0.0, -c) + p[7] * max(0.0, 0.05 * rest - c) + p[8] * max(0.0, 0.15 * rest - c)
     out += p[9] * max(0.0, 0.35 * rest - c) + p[10] * max(0.0, 0.7 * rest - c)
     out += p[11] * max(0.0, rest - c) + p[12] * (max(0.0, 1.4 * rest - c) - 0.4 * rest)
