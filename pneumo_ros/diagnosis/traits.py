@@ -64,6 +64,15 @@ class IsScreened(Protocol):
 
 
 @runtime_checkable
+class BeginsAlone(Protocol):
+    """A shape that is fitted from some values as well, without its family's laws."""
+
+    @property
+    def begins(self) -> Sequence[tuple[float, ...]]:
+        """Values of its parameters there, SI; empty for a shape that starts at nothing only."""
+
+
+@runtime_checkable
 class IsFollowed(Protocol):
     """A sensor's error that leaves the reading alive."""
 

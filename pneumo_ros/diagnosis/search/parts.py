@@ -12,6 +12,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import restricted
 from pneumo_ros.diagnosis.search.screening import candidate_scores, trials
+from pneumo_ros.diagnosis.traits import BeginsAlone
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
 SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
@@ -40,14 +41,14 @@ def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
 
 def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
     """A structure with further parts, which start at nothing; what is no size and has further starts (a frequency)
-    starts at the one that promises most.
+    starts at the one that promises most. A shape that may do its laws' work alone is also fitted from there.
     """
     candidate = Candidate((*one.candidate.parts, *parts))
     values = problem.values(one.candidate, one.x).tolist()
     for part in parts:
         values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
-    scanned = [part for part in parts if part in problem.scanned]
-    starts = [values, *(_scanned(problem, one, part, parts, values) for part in scanned)]
+    alone = [(part, own) for part in parts for own in _begins(problem, part)]
+    starts = [values, *(_alone(problem, one, part, own, parts, values) for part, own in alone)]
 
     def fitted(values: Sequence[float]) -> Fit:
         start = problem.start(candidate, one.x[: problem.fixed], values)
@@ -57,18 +58,28 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
     return found if found.cost < one.cost else one
 
 
-def _scanned(problem: Problem, one: Fit, shape: Part, parts: Sequence[Part], values: Sequence[float]) -> list[float]:
-    """Start values of a structure with further parts, one of which is a shape that the logs were scanned for: it does
-    then what its family's laws did, and these start at nothing.
+def _begins(problem: Problem, part: Part) -> list[tuple[float, ...]]:
+    """Values from which a shape is fitted without its family's laws: its own, and what the logs were scanned for."""
+    effect = problem.model.effects[part[0]]
+    own = effect.begins if isinstance(effect, BeginsAlone) else ()
+    scanned = problem.scanned.get(part)
+    return [*own, *([] if scanned is None else [tuple(scanned)])]
+
+
+def _alone(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts: Sequence[Part],
+           values: Sequence[float]) -> list[float]:  # fmt: skip
+    """Start values of a structure with further parts, one of which is a shape that does what its family's laws did;
+    these start at nothing.
     """
     out, first = list(values), 0
     for part in (*one.candidate.parts, *parts):
-        own = problem.parameters_of[part]
+        count = len(problem.parameters_of[part])
         if part == shape:
-            out[first : first + len(own)] = problem.scanned[shape]
+            out[first : first + count] = own
         elif part[1] == shape[1] and family_of(part[0]) == family_of(shape[0]):
-            out[first : first + len(own)] = [0.0 if p.size else v for p, v in zip(own, out[first:], strict=False)]
-        first += len(own)
+            before = zip(problem.parameters_of[part], out[first : first + count], strict=True)
+            out[first : first + count] = [0.0 if p.size else v for p, v in before]
+        first += count
     return out
 
 

@@ -44,6 +44,7 @@ WAYS = ("rising", "falling")
 UNEVEN = (0.008, 0.03)  # s, lags one way of a valve that is quick the other way
 QUICK = 0.001  # s
 SHARE = 0.3
+BEGINS = ((0.05, 0.005), (0.005, 0.05))  # s, lags up and down from which a follower that does all of it is fitted
 RESTS = (0.0291, 0.0207, -0.0166, -0.0250, 2.77e5, 4.29e5)  # m, Pa absolute: CHANNELS of the nominal rig at rest
 PRESSURE_SWING, LVDT_SWING = 5e4, 0.01  # Pa, m: of a session
 KINKED = "scale above 0"
@@ -114,9 +115,10 @@ def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParam
 
 def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
            fitted: tuple[EffectParameter, ...] = (), made: Callable[..., Filter] | None = None,
-           alone: bool = False, taken: bool = False) -> Effect:  # fmt: skip
+           alone: bool = False, taken: bool = False, follows: bool = False) -> Effect:  # fmt: skip
     """A valve's shape; one filter whose numbers are fitted is ``made`` of the last parameters, after its share, and
-    tried ``alone`` as well, or scanned for where these are an interval and a phase (``taken``).
+    tried ``alone`` as well, scanned for where these are an interval and a phase (``taken``), or begun with as all of
+    it where it ``follows``.
     """
 
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -131,7 +133,9 @@ def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filt
     parameters = (*_shares(names, name.startswith("anything")), *fitted)
     screened = (len(names),) if alone else ()
     at = (len(names), len(names) + 1, len(names) + 2) if taken else ()
-    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened, taken=at)
+    begins = _begun(parameters) if follows else ()
+    return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened, taken=at,
+                  begins=begins)  # fmt: skip
 
 
 def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -198,7 +202,8 @@ def _sensor(name: str, summary: str, sites: tuple[str, ...], swing: float, power
     every_sign = name.startswith("anything")
     own = _shares([f"lag {t:g} s" for t in lags], every_sign)
     parameters = (*(amplitude(atom) for atom in atoms), *ended, *own, *follower)
-    return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo, screened=alone)
+    begins = _begun(parameters) if follower else ()
+    return Effect(name, summary, sites, (), parameters, outputs=outputs, undo=undo, screened=alone, begins=begins)
 
 
 def _creeping(name: str, sites: tuple[str, ...], typical: float, unit: str) -> Effect:
@@ -228,6 +233,12 @@ def _follower(unit: str, slew: float, fastest: float) -> tuple[EffectParameter, 
     )
 
 
+def _begun(parameters: Sequence[EffectParameter]) -> tuple[Values, ...]:
+    """Values of a shape that ends with a follower, which does all of it without a rate limit, with a lag one way."""
+    before = [0.0 if p.size else p.typical for p in parameters[:-4]]
+    return tuple((*before, 1.0, parameters[-3].high, *lags) for lags in BEGINS)
+
+
 LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
 UNEVEN_NAMES = [f"slow {way} {t:g} s" for t in UNEVEN for way in ("opening", "closing")]
 ONE_WAY = [_follow(math.inf, *pair) for t in UNEVEN for pair in ((t, QUICK), (QUICK, t))]
@@ -238,20 +249,20 @@ STICKING = (*_shares(["sticking"]),
             EffectParameter("band", "m2", 1e-8, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
 TAKING = (*_shares(["taken"]), EffectParameter("interval", "s", 4e-3, 0.25, 0.05, spread=10.0),
           EffectParameter("phase", "1", 0.0, 1.0, 0.5, spread=10.0))  # fmt: skip
+EXCITER = (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
+           *_shares([f"lag {t:g} s" for t in EXCITER_LAGS]), *_follower("m/s", 0.06, 1.0))  # fmt: skip
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
            [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
-           _follower("m2/s", 1.5e-6, 3e-5), _follow),
+           _follower("m2/s", 1.5e-6, 3e-5), _follow, follows=True),
     _valve("transport_delay.shape", "commands that come late by delays of many lengths, or at a driver's intervals",
            DELAY_NAMES, LATE, False, TAKING, _take, taken=True),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play, or a spool that sticks and jumps",
            ZONE_NAMES, ZONES, True, STICKING, _stick, alone=True),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
-    Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",),
-           (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
-            *_shares([f"lag {t:g} s" for t in EXCITER_LAGS]), *_follower("m/s", 0.06, 1.0)),
-           inputs=_exciter),
+    Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",), EXCITER, inputs=_exciter,
+           begins=_begun(EXCITER)),
     _creeping("lvdt_offset.shape", DISPLACEMENTS, LVDT_CREEP, "m"),
     _creeping("pressure_offset.shape", PRESSURES_OR_BOTH, PRESSURE_CREEP, "Pa"),
     _sensor("lvdt_scale.shape", "a sensitivity that is off, or not constant", DISPLACEMENTS, LVDT_SWING,
