@@ -169,7 +169,8 @@ def test_a_publisher_that_is_there_already_is_named_before_anything_starts(tmp_p
         options = (*SHORT, *hardware, "--namespace", "rig1", "--output", str(tmp_path / "x.mcap"))
         process = sessions.start(*options, domain=domain)
         said, _ = process.communicate(timeout=180)
-    assert process.returncode == 2 and "/intruder publishes /rig1/rig/displacement" in said
+    assert process.returncode == 2, said
+    assert "/intruder publishes /rig1/rig/displacement" in said
     assert not list(tmp_path.glob("x.mcap*"))
 
 
