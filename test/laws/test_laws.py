@@ -109,16 +109,16 @@ def test_memories_relax_and_openings_open() -> None:
     assert flow.relieved(2.0, 3.0) == 0.0 and flow.relieved(5.0, 3.0) == 2.0
     assert flow.through_opening(4.0, 0.0, 4.0, 1.0) == pytest.approx(4.0)
     assert flow.in_excess(2.0, 0.1, 0.5, 0.2) == pytest.approx(0.22)
+    assert flow.settling(0.5, 10.0) == 0.05
 
 
 def test_a_vessel_fills_with_the_root_of_the_difference_either_way() -> None:
-    """Eq. 4.6 for small differences: W goes with sqrt(dP); near none it is linear, so that a step ends."""
+    """W goes with sqrt(dP) where differences are small against the pressure; near none it is linear."""
     at_scale = flow.filling(3e5 + 1e3, 3e5, 1e3, 0.05)
     assert at_scale == pytest.approx(1e3 / 0.05, rel=0.03)
     assert flow.filling(3e5 + 4e3, 3e5, 1e3, 0.05) == pytest.approx(2.0 * at_scale, rel=0.03)
     assert flow.filling(3e5, 3e5 + 1e3, 1e3, 0.05) == -at_scale
     assert flow.filling(3e5 + 0.1, 3e5, 1e3, 0.05) == pytest.approx(5.0 * 0.1 / 0.05, rel=0.01)
-    assert flow.settling(0.5, 10.0) == 0.05
 
 
 def test_errors_of_a_signal_undo_and_agree() -> None:

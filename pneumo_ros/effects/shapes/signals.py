@@ -115,10 +115,10 @@ def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParam
 
 def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
            fitted: tuple[EffectParameter, ...] = (), made: Callable[..., Filter] | None = None,
-           alone: bool = False, taken: bool = False, follows: bool = False) -> Effect:  # fmt: skip
+           alone: bool = False, taken: bool = False) -> Effect:  # fmt: skip
     """A valve's shape; one filter whose numbers are fitted is ``made`` of the last parameters, after its share, and
-    tried ``alone`` as well, scanned for where these are an interval and a phase (``taken``), or begun with as all of
-    it where it ``follows``.
+    tried ``alone`` as well, or scanned for where these are an interval and a phase (``taken``); a follower is begun
+    with as all of it.
     """
 
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -133,7 +133,7 @@ def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filt
     parameters = (*_shares(names, name.startswith("anything")), *fitted)
     screened = (len(names),) if alone else ()
     at = (len(names), len(names) + 1, len(names) + 2) if taken else ()
-    begins = _begun(parameters) if follows else ()
+    begins = _begun(parameters) if made is _follow else ()
     return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened, taken=at,
                   begins=begins)  # fmt: skip
 
@@ -254,7 +254,7 @@ EXCITER = (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0)
 EFFECTS = (
     _valve("valve_lag.shape", "a slow valve of any law: lags of every length, rate limits",
            [*LAG_NAMES, *UNEVEN_NAMES, DELAY_NAMES[0]], [*SLOW, *ONE_WAY, LATE[0]], False,
-           _follower("m2/s", 1.5e-6, 3e-5), _follow, follows=True),
+           _follower("m2/s", 1.5e-6, 3e-5), _follow),
     _valve("transport_delay.shape", "commands that come late by delays of many lengths, or at a driver's intervals",
            DELAY_NAMES, LATE, False, TAKING, _take, taken=True),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play, or a spool that sticks and jumps",
