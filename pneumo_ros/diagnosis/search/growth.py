@@ -18,11 +18,19 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
-from pneumo_ros.diagnosis.search.intervals import sharpened
+from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, reduced, rival, shaped, shapes_of, with_shapes
-from pneumo_ros.diagnosis.search.screening import CandidateScore, all_parts, candidate_scores, compatible, trials
+from pneumo_ros.diagnosis.search.screening import (
+    CandidateScore,
+    all_parts,
+    as_scanned,
+    candidate_scores,
+    compatible,
+    trials,
+)
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
+    THIRD,
     Scored,
     Thresholds,
     by_families,
@@ -45,6 +53,7 @@ MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 # Share of the gain that would be evident: what a round must bring, as a step towards one that is [taste]
 STEP: Final = 0.3
 EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
+POLISHES: Final = 3  # exchanges tried at the end, however little is left [numerics]
 PASSES: Final = 2  # over the effects of the best structure, exchanging each; the second where the first did [numerics]
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 CLOSE: Final = 12.0  # log weight that a structure of other families may be behind to be fitted to the end [numerics]
@@ -67,6 +76,13 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     if further and best.size and room_for_more(search):
         _climb(search, best, max(limits.second_cost, limits.second_share * best.samples))
         best = _selected(search, limits)
+        if _much_left(search, best) and _rescanned(search, best.fit):
+            rescanned = _selected(search, limits)
+            if rescanned.fit is not best.fit and _much_left(search, rescanned):
+                _climb(search, rescanned, max(limits.second_cost, limits.second_share * best.samples))
+            best = _selected(search, limits)
+    if further and best.size >= THIRD:
+        best = _polished(search, best, limits)
     if best.size > 1:
         _refine(search, best, limits)
         refined = _selected(search, limits)
@@ -143,6 +159,31 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
             break
 
 
+def _rescanned(search: Search, found: Fit) -> bool:
+    """Scan for intervals once more, beside what has been found but for a delay, and fit what they promise; whether they
+    promise anything.
+
+    A driver that holds a tenth of the gap is not to be heard in what the refit leaves: the rest is ten times as loud.
+    """
+    problem = search.problem
+    if taken_at(problem, found):
+        return False
+    families = {family_of(name) for name, _, _ in shapes_that_take(problem.model)}
+    late = [law for law in found.candidate.laws if family_of(law[0]) in families]
+    bare = reduced(problem, found, [p for law in late for p in of_law(found.candidate, law)], 2) if late else found
+    bare = refreshed(problem, bare)
+    scanned = {} if bare.diverged else intervals(problem, bare)
+    if not scanned:
+        return False
+    search.problem = problem = replace(problem, scanned=scanned)
+    search.logged = replace(search.logged, scanned=scanned)
+    starts = [as_scanned(problem, law) for law in _compatible(problem, bare.candidate.laws)]
+    short = short_fits(search, bare, [one for one in starts if one is not None], (0.89, 0.89))
+    if short:
+        search.structures.append(sharpened(problem, short[0], search.effort.long))
+    return True
+
+
 def _much_left(search: Search, one: Scored) -> bool:
     """Whether a structure leaves so much that others may serve better."""
     return one.level > max(MISFIT, MISFIT_OF_REFIT * score(search.problem, search.refit).level)
@@ -164,15 +205,19 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
 
     What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
     of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
+    What may act beside all of them is simulated once, beside all of them: what it changes hardly depends on one.
     """
     problem = search.problem
+    beside = _compatible(problem, found.candidate.laws)
+    simulated = trials(problem, found, beside)
 
     def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
         bare = reduced(problem, found, of_law(found.candidate, law), 2)
         if bare.diverged:
             return []
-        others = [part for part in _compatible(problem, bare.candidate.laws) if part != law]
-        screened = varied(candidate_scores(problem, bare, trials(problem, bare, others)), EXCHANGED[0], 2)
+        others = [part for part in _compatible(problem, bare.candidate.laws) if part != law and part not in beside]
+        tried = [*simulated, *trials(problem, bare, others)]
+        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED[0], 2)
         probes = problem.each(lambda one: (*probed_one(problem, bare, _with_shape(problem, one)), bare), screened)
         return sorted(probes, key=lambda item: item[0])[:1]
 
@@ -181,6 +226,23 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
     short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
     ended = shaped(problem, short, search.effort.short)
     return min(ended, key=lambda one: score(problem, one).price, default=None)
+
+
+def _polished(search: Search, best: Scored, limits: Thresholds) -> Scored:
+    """The best structure once its effects have been exchanged for any other, however little it leaves: an area that is
+    off and a resonance leave next to nothing of a load, and the load less.
+    """
+    refit, found = score(search.problem, search.refit), best
+    for _ in range(POLISHES):
+        other = _one_exchanged(search, found.fit)
+        if other is None:
+            break
+        search.structures.append(other)
+        better = score(search.problem, other)
+        if likeliest(refit, [found, better]) is found:
+            break
+        found = better
+    return _selected(search, limits)
 
 
 def _selected(search: Search, limits: Thresholds) -> Scored:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, level
+from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.screening import Trial, changes, projected
 from pneumo_ros.effects.parameters import family_of
@@ -87,9 +88,7 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
     """Start values, SI, of every shape that may take its command at intervals: those that explain most of what a fit
     leaves. Nothing of a shape that explains nothing.
     """
-    model = problem.model
-    shapes = [(e.id, site, e.taken) for e in model.effects.values() if isinstance(e, TakesAtIntervals) and e.taken
-              for site in e.sites]  # fmt: skip
+    model, shapes = problem.model, shapes_that_take(problem.model)
     if not isinstance(model, HasIntervals) or not shapes:
         return {}
     pushes = _pushes(problem, base, sorted({c for _, site, _ in shapes for c in model.columns(site)}))
@@ -117,6 +116,12 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
         if best is not None:
             out[name, site] = best
     return out
+
+
+def shapes_that_take(model: Model) -> list[tuple[str, str, tuple[int, ...]]]:
+    """Id, site and :attr:`TakesAtIntervals.taken` of every shape that may take its command at intervals."""
+    return [(e.id, site, e.taken) for e in model.effects.values() if isinstance(e, TakesAtIntervals) and e.taken
+            for site in e.sites]  # fmt: skip
 
 
 def _explained(asked: Array, square: Array) -> Array:

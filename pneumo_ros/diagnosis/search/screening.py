@@ -70,8 +70,12 @@ def start_values(parameters: Sequence[EffectParameter]) -> list[tuple[float, ...
         for value in p.starts:
             tries.append(tuple(value if m == k else v for m, v in enumerate(typical)))
     sizes = [k for k, p in enumerate(parameters) if p.size]
-    if len(sizes) > 1:  # each size alone
-        tries += [tuple(v if m == k or m not in sizes else 0.0 for m, v in enumerate(typical)) for k in sizes]
+    if len(sizes) > 1:  # each size alone, typical and small
+        for share in (1.0, SMALL):
+            tries += [
+                tuple(v * share if m == k else v if m not in sizes else 0.0 for m, v in enumerate(typical))
+                for k in sizes
+            ]
     return list(dict.fromkeys(tries))
 
 
@@ -215,7 +219,11 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
 
 
 def projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
-    """Gram matrix of the trials' changes and their products with the residual, both free of what the base can do."""
+    """Gram matrix of the trials' changes and their products with the residual, both free of what the base can do.
+
+    What a base strains for is counted with what it leaves: a load that masses and areas answer for, far from their
+    nominal values, leaves little to explain, and lets them come back.
+    """
     assert base.jacobian is not None
     rows = problem.fitted
     r = base.residual[rows]
@@ -237,7 +245,8 @@ def projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -
     J = J / size
     curvature = J.T @ J + np.diag(prior / (strength * size**2) + SAME_COLUMN)
     DJ = D @ J
-    answers = np.linalg.solve(curvature, np.column_stack([DJ.T, J.T @ weighted]))
+    asked = J.T @ weighted + prior * base.x[free] / (strength * size)  # at a converged fit the two cancel
+    answers = np.linalg.solve(curvature, np.column_stack([DJ.T, asked]))
     gram = D @ D.T - DJ @ answers[:, :-1]
     with_residual = D @ weighted - DJ @ answers[:, -1]
     return gram, with_residual, float(weighted @ weighted)

@@ -15,10 +15,10 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, secant
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.growth import _one_exchanged, _one_more, grow
+from pneumo_ros.diagnosis.search.growth import MISFIT, _one_exchanged, _one_more, _polished, grow
 from pneumo_ros.diagnosis.search.parts import rival
-from pneumo_ros.diagnosis.search.screening import compatible
-from pneumo_ros.diagnosis.search.selection import Thresholds, score, select
+from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
+from pneumo_ros.diagnosis.search.selection import Thresholds, likeliest, score, select
 from pneumo_ros.diagnosis.search.state import Effort
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.effects.rig_model import RigModel
@@ -105,6 +105,48 @@ class TriedAlone(PlainEffect):
     """A shape whose one atom is tried alone."""
 
     screened: tuple[int, ...] = (0,)
+
+
+@dataclass(frozen=True)
+class Loaded(Sum):
+    """The same with an effect that the gain's tolerance answers for but for a trace."""
+
+    def predict(
+        self, record: DrivenLog, nuisance: Array, initial: Array, active: Sequence[Active], rows: int | None = None
+    ) -> Array:
+        rest = tuple(one for one in active if one.effect != "load")
+        load = sum(one.values[0] for one in active if one.effect == "load")
+        trace = load * (SIGNALS["drive"] + 1e-3 * SIGNALS["other"])
+        return np.asarray(super().predict(record, nuisance, initial, rest, rows) + trace[:rows, None])
+
+
+def test_what_an_effect_lets_the_tolerances_come_back_from_is_worth_as_much_as_what_it_explains() -> None:
+    """A gain two sigma off hides a load of the same size; the log alone tells next to nothing of which it is."""
+    effects = {name: one for name, one in _effects().items() if name in TRUE}
+    effects["load"] = PlainEffect("load", ("",), effects["a"].parameters)
+    problem, nominal = Problem(Loaded(effects=effects), (made({"drive": 0.2}),)), Candidate()
+    refit = fit(problem, nominal, problem.start(nominal, None, ()))
+    assert refit.x[0] == pytest.approx(2.4, abs=0.05)
+    scores = candidate_scores(problem, refit, trials(problem, refit, all_parts(problem)))
+    assert scores[0].parts == (("load", ""),) and scores[0].values[0] == pytest.approx(0.24, rel=0.05)
+    one = Candidate(scores[0].parts)
+    found = fit(problem, one, problem.start(one, refit.x, scores[0].values))
+    assert refit.cost - found.cost == pytest.approx(refit.x[0] ** 2, rel=0.1)
+
+
+def test_of_three_effects_one_is_exchanged_however_little_is_left() -> None:
+    """A trifle beside a strained gain leaves as little as the load itself, which needs no strain."""
+    effects = {name: one for name, one in _effects().items() if name in TRUE}
+    effects["load"] = PlainEffect("load", ("",), effects["a"].parameters)
+    problem = Problem(Loaded(effects=effects), (made({"a": 1.0, "b": 0.6, "drive": 0.2}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    wrong = Candidate((("a", ""), ("b", ""), ("c", "")))
+    found = score(problem, fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3, 0.01))))
+    assert found.level < MISFIT
+    _polished(search, found, Thresholds())
+    right = [one for one in search.structures if {name for name, _ in one.candidate.laws} == {"a", "b", "load"}]
+    assert right and score(problem, right[0]).stretch < 0.3 * found.stretch
+    assert likeliest(score(problem, search.refit), [found, score(problem, right[0])]).fit is right[0]
 
 
 def test_an_effect_at_the_wrong_site_is_exchanged_for_the_right_one() -> None:

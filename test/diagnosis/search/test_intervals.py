@@ -14,11 +14,12 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, refreshed
 from pneumo_ros.diagnosis.search.competition import compete
 from pneumo_ros.diagnosis.search.fitting import by_cost
+from pneumo_ros.diagnosis.search.growth import _rescanned
 from pneumo_ros.diagnosis.search.intervals import interval_words, intervals
 from pneumo_ros.diagnosis.search.parts import with_shapes
 from pneumo_ros.diagnosis.search.screening import as_scanned
 from pneumo_ros.diagnosis.search.selection import score
-from pneumo_ros.diagnosis.search.state import Effort
+from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.effects.contract import Ends, Inputs
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -100,6 +101,21 @@ def test_a_fitted_delay_gives_way_to_what_the_scan_found() -> None:
     late = fit(problem, law, problem.start(law, None, (0.5 * INTERVAL,)), iterations=10)
     both = with_shapes(problem, late, 8)
     assert both.cost < 0.5 * late.cost
+
+
+def test_intervals_are_scanned_once_more_beside_what_was_found_without_its_delay() -> None:
+    """Where a structure explains a slow valve and calls the driver a delay; one with its intervals is left alone."""
+    problem = problem_of(TAKEN, BESIDE)
+    start = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=20)
+    search = Search(problem, problem, start, Effort(), lambda share, what: None)
+    laws = Candidate((("valve_lag", "rear"), ("transport_delay", "front")))
+    found = fit(problem, laws, problem.start(laws, None, (0.03, 0.8, 0.5 * INTERVAL)), iterations=10)
+    assert _rescanned(search, found)
+    (better,) = search.structures
+    assert set(better.candidate.laws) == set(laws.laws) and better.cost < found.cost
+    values = problem.values(better.candidate, better.x).tolist()[-len(SHAPE.parameters) :]
+    assert values_of(tuple(values))["interval"] == pytest.approx(INTERVAL, abs=INTERVAL**2 / (4.0 * SECONDS))
+    assert not _rescanned(search, better) and search.structures == [better]
 
 
 def test_a_command_that_stands_still_is_not_scanned() -> None:
