@@ -325,15 +325,17 @@ def test_a_tyre_that_loses_more_under_load(power: float) -> None:
 
 @pytest.mark.parametrize("name", ["valve_lag.shape", "exciter_lag.shape", "pressure_lag.shape"])
 def test_a_follower_begins_as_all_of_a_slow_part(name: str) -> None:
-    """Slow one way, quick the other, no limit, and none of the mixture: within the bounds, of every parameter."""
+    """Slow one way and quick the other without a limit, or limited, and none of the mixture: within all bounds."""
     shape = SHAPES[name]
-    assert len(shape.begins) == 2
+    assert len(shape.begins) == 4
+    (most,) = (p.high for p in shape.parameters if p.name == "slew")
+    slews = []
     for values in shape.begins:
         of_name = dict(zip((p.name for p in shape.parameters), values, strict=True))
         assert all(p.low <= v <= p.high for p, v in zip(shape.parameters, values, strict=True))
         assert {p.name for p in shape.parameters if p.size and of_name[p.name] != 0.0} == {"follower"}
-        assert of_name["follower"] == 1.0 and [of_name["slew"]] == [
-            p.high for p in shape.parameters if p.name == "slew"
-        ]
-    first, second = (values[-2:] for values in shape.begins)
-    assert first == second[::-1] and first[0] != first[1]
+        assert of_name["follower"] == 1.0
+        slews.append(of_name["slew"])
+    first, second = (values[-2:] for values in shape.begins[:2])
+    assert first == second[::-1] and first[0] != first[1] and slews[:2] == [most, most]
+    assert slews[2] < slews[3] < most

@@ -19,7 +19,7 @@ from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
-from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, reduced, rival, shaped, shapes_of, with_shapes
+from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, begun, reduced, rival, shaped, shapes_of, with_shapes
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
@@ -224,7 +224,7 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
     each = problem.each(instead, found.candidate.laws)
     chosen = sorted((one for some in each for one in some), key=lambda item: item[0])[: EXCHANGED[1]]
     short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
-    ended = shaped(problem, short, search.effort.short)
+    ended = problem.each(lambda one: _with_all_shapes(search, one), short)
     return min(ended, key=lambda one: score(problem, one).price, default=None)
 
 
@@ -260,11 +260,15 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     short = short_fits(search, leader, chosen, (0.86, 0.86))
 
     def ended(one: Fit) -> Fit:
-        return with_shapes(
-            problem, fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long), effort.short
-        )
+        return _with_all_shapes(search, fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long))
 
     return problem.each(ended, short[: counts[2]])
+
+
+def _with_all_shapes(search: Search, one: Fit) -> Fit:
+    """A structure whose last law has come just now, with the shapes that it lacks, and its own also begun alone."""
+    problem, steps = search.problem, search.effort.short
+    return with_shapes(problem, begun(problem, one, one.candidate.laws[-1], steps), steps)
 
 
 def _with_shape(problem: Problem, one: CandidateScore) -> CandidateScore:
@@ -332,7 +336,8 @@ def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
     ranked = probed(problem, bare, screened)
     promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
     chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
-    others = shaped(problem, short_fits(search, bare, chosen, (0.9, 0.9)))
+    short = short_fits(search, bare, chosen, (0.9, 0.9))
+    others = problem.each(lambda one: _with_all_shapes(search, one), short)
     search.structures += others  # the worse ones as well: they may be as likely
     return likeliest(score(problem, search.refit), [score(problem, one) for one in (found, *others)]).fit
 

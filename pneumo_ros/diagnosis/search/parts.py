@@ -6,12 +6,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+import numpy as np
+
 from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.search.fitting import restricted
+from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted
 from pneumo_ros.diagnosis.search.screening import candidate_scores, trials
+from pneumo_ros.diagnosis.search.selection import FORM, score
 from pneumo_ros.diagnosis.traits import BeginsAlone
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
@@ -54,8 +57,41 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
         start = problem.start(candidate, one.x[: problem.fixed], values)
         return fit(problem, candidate, start, one.jacobian, rows=rows, iterations=iterations, shared=len(one.x))
 
-    found = min(problem.each(fitted, starts), key=lambda other: other.cost)
+    found = min(problem.each(fitted, starts), key=lambda other: _left(problem, other))
     return found if found.cost < one.cost else one
+
+
+def begun(problem: Problem, one: Fit, law: Part, iterations: int) -> Fit:
+    """A structure that has a law's shape already, or where it ends when that shape begins by doing all that the law and
+    it do: the start that promises most after a few cheap steps is fitted.
+    """
+    shapes = [part for part in of_law(one.candidate, law) if part != law]
+    values = problem.values(one.candidate, one.x).tolist()
+    starts = [_alone(problem, one, part, own, (), values) for part in shapes for own in _begins(problem, part)]
+    own = (one.candidate.parts.index(part) for part in (law, *shapes))
+    before = Candidate(one.candidate.parts[: min(own)])
+    shared = problem.fixed + len(problem.effect_parameters(before))  # columns that do not begin elsewhere
+
+    def probe(start: Sequence[float]) -> Fit:
+        x = problem.start(one.candidate, one.x[: problem.fixed], start)
+        return fit(problem, one.candidate, x, one.jacobian, iterations=PROBE, probe=True, shared=shared)
+
+    probes = [other for other in problem.each(probe, starts) if not other.diverged]
+    if not probes:
+        return one
+    best = min(probes, key=lambda other: other.cost)
+    other = fit(problem, one.candidate, best.x, None, iterations=iterations)
+    return other if other.cost < one.cost and _left(problem, other) < _left(problem, one) else one
+
+
+def _left(problem: Problem, one: Fit) -> float:
+    """Log mean square of fitted and of kept samples, with the priors: a start that serves the fitted ones alone is no
+    better.
+    """
+    if one.diverged:
+        return float("inf")
+    scored = score(problem, one)
+    return one.cost / scored.samples + float(np.log(FORM + scored.level))
 
 
 def _begins(problem: Problem, part: Part) -> list[tuple[float, ...]]:

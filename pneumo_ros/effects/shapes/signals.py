@@ -45,6 +45,8 @@ UNEVEN = (0.008, 0.03)  # s, lags one way of a valve that is quick the other way
 QUICK = 0.001  # s
 SHARE = 0.3
 BEGINS = ((0.05, 0.005), (0.005, 0.05))  # s, lags up and down from which a follower that does all of it is fitted
+LIMITS = (0.5, 1.5)  # of the typical rate limit, the same with lags of LIMITED s
+LIMITED = 0.01
 RESTS = (0.0291, 0.0207, -0.0166, -0.0250, 2.77e5, 4.29e5)  # m, Pa absolute: CHANNELS of the nominal rig at rest
 PRESSURE_SWING, LVDT_SWING = 5e4, 0.01  # Pa, m: of a session
 KINKED = "scale above 0"
@@ -234,9 +236,12 @@ def _follower(unit: str, slew: float, fastest: float) -> tuple[EffectParameter, 
 
 
 def _begun(parameters: Sequence[EffectParameter]) -> tuple[Values, ...]:
-    """Values of a shape that ends with a follower, which does all of it without a rate limit, with a lag one way."""
-    before = [0.0 if p.size else p.typical for p in parameters[:-4]]
-    return tuple((*before, 1.0, parameters[-3].high, *lags) for lags in BEGINS)
+    """Values of a shape that ends with a follower, which does all of it: without a rate limit and with a lag one way,
+    or with a limit.
+    """
+    before, slew = [0.0 if p.size else p.typical for p in parameters[:-4]], parameters[-3]
+    uneven = [(*before, 1.0, slew.high, *lags) for lags in BEGINS]
+    return (*uneven, *((*before, 1.0, share * slew.typical, LIMITED, LIMITED) for share in LIMITS))
 
 
 LAG_NAMES, DELAY_NAMES = [f"lag {t:g} s" for t in VALVE_LAGS], [f"delay {t:g} s" for t in DELAYS]
