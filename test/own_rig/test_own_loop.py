@@ -78,6 +78,19 @@ def test_a_bound_at_which_another_family_begins_counts_whole(
     assert at_bounds(problem, stuck) == (counted, 0.0)
 
 
+@pytest.mark.parametrize(("above", "counted"), [(1.0, 1.0), (1.02, 1.0), (1.2, 0.0)])
+def test_a_hysteresis_that_yields_at_once_is_friction_beside_its_shape_too(
+    above: float, counted: float, cart: tuple[OwnRig, OwnRecord]
+) -> None:
+    """No slider of the shape is as short, and no fit ends at a bound exactly."""
+    problem = Problem(cart[0], (cart[1],))
+    candidate = Candidate((("hysteresis", "rail"), ("hysteresis.shape", "rail")))
+    size, travel, *atoms = problem.effect_parameters(candidate)
+    values = [size.typical, above * travel.low, *(p.typical for p in atoms)]
+    stuck = Fit(candidate, problem.start(candidate, None, values), 0.0, np.zeros((1, 1)))
+    assert at_bounds(problem, stuck) == (counted, 0.0)
+
+
 @pytest.mark.parametrize(
     ("law", "values"),
     [("hysteresis", (6.0, 0.01)), ("hysteresis.growing", (6.0, 0.02, 1.2)), ("hysteresis.sliders", (6.0, 0.01))],

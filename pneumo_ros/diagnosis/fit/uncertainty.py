@@ -22,6 +22,7 @@ TRUE_TO: Final = 2e-3  # relative accuracy of the sensitivities [numerics]
 # Share of an effect's value that is added to its std: another law of the same kind puts its parameter that far off
 # [taste]
 LAW: Final = 0.015
+NEAR: Final = 0.05  # of a border to another family: a value so near to it stands at it [taste]
 UNUSED: Final = 1e-3  # share of a typical size below which an effect or an atom counts as absent [numerics]
 NOTHING: Final = 1e-3  # sigmas, rms over all samples, that one typical size must move the outputs by [numerics]
 
@@ -131,7 +132,8 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     The first sum is of sizes and of shape parameters of laws. A size at its bound counts 1 (nothing real is so large),
     and so does a shape parameter at a bound where another family begins; all other shape parameters of a law count
     0.5 together, because another law of the family may need them there. Where the family's flexible shape stands
-    beside the law, a size counts 0.5 and the law's shape parameters nothing: the flexible shape can do the same. The
+    beside the law, a size counts 0.5 and the law's shape parameters nothing, for the flexible shape can do the same;
+    but not what lies beyond the border to another family, so that one at such a border counts as without it. The
     second sum is of the parameters of flexible shapes that are no sizes, 0.5 each.
 
     Parameters
@@ -142,15 +144,16 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     first, firm, bent = 0, 0.0, 0.0
     for part in fit.candidate.parts:
         own = problem.effect_parameters(Candidate((part,)))
-        at = [(p, values[k]) for k, p in enumerate(own, first) if not free[k]]
+        at = [(p, values[k]) for k, p in enumerate(own, first) if not free[k] or _crosses(p, values[k])]
         stuck = [(p, value) for p, value in at if not _stands_at(p, value, p.ends)]
         first += len(own)
         if parts is not None and part not in parts:
             continue
         law = is_law(part[0])
         beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-        sizes = sum(p.size or (not beside and _stands_at(p, value, p.borders)) for p, value in stuck)
-        firm += sizes * (0.5 if beside else 1.0) + (0.5 if law and not beside and len(stuck) > sizes else 0.0)
+        over = sum(_crosses(p, value) for p, value in stuck)
+        sizes = sum(p.size or _crosses(p, value) for p, value in stuck)
+        firm += over + (sizes - over) * (0.5 if beside else 1.0) + (0.5 if law and not beside and len(stuck) > sizes else 0.0)
         bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
     return firm, bent
 
@@ -159,6 +162,12 @@ def _stands_at(parameter: EffectParameter, value: float, ends: Sequence[float]) 
     """Whether the bound that a value stands at is one of these."""
     bound = min(parameter.low, parameter.high, key=lambda one: abs(value - one))
     return any(abs(bound - end) <= 1e-9 * abs(parameter.typical) for end in ends)
+
+
+def _crosses(parameter: EffectParameter, value: float) -> bool:
+    """Whether a value stands where another family begins, as nearly as a fit can tell."""
+    least = 1e-9 * abs(parameter.typical)
+    return any(abs(value - border) <= max(NEAR * abs(border), least) for border in parameter.borders)
 
 
 def _free(problem: Problem, fit: Fit) -> Mask:
