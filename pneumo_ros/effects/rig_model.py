@@ -45,6 +45,7 @@ COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
 Memories = tuple[Memory, ...]  # one an effect; empty before the first block
 STILL = 1e-10  # m2
 PLANTS = 64  # kept at a time
+DRIVEN = 32  # records with what their commands and road come to, kept at a time
 NO_CORRECTION = np.zeros((0, len(CORRECTIONS)))
 
 
@@ -181,6 +182,29 @@ class RigModel:
             kept.append(before)
         return inputs, tuple(kept)
 
+    def _driven_by(self, record: Drive, count: int, late: float, active: Sequence[Active]) -> Inputs:
+        """What of a record's first rows acts on the plant, its commands ``late`` s later; kept, because most of what a
+        fit varies does not touch it.
+        """
+        acting = tuple(one for one in (*self.configured, *active) if self.library[one.effect].inputs is not None)
+        key = (id(record), count, late, acting)
+        known = self._driven.get(key)
+        if known is not None and known[0] is record:
+            return known[1]
+        inputs = Inputs(record.commands[: count - 1], record.road[:count])
+        if late != 0.0:
+            inputs = inputs._replace(commands=shifted(inputs.commands, late / record.period))
+        commands, road = self.driven(inputs, record.period, active)[0]
+        inputs = Inputs(np.ascontiguousarray(commands), np.ascontiguousarray(road))
+        if len(self._driven) >= DRIVEN:
+            self._driven.clear()
+        self._driven[key] = (record, inputs)
+        return inputs
+
+    @cached_property
+    def _driven(self) -> dict[tuple[int, int, float, tuple[Active, ...]], tuple[Drive, Inputs]]:
+        return {}
+
     def simulate_channels(self, state: Array) -> Array:
         """What ideal sensors show of one state, (6,)."""
         return ideal_channels(np.asarray(state, dtype=float), self._base.body)
@@ -196,16 +220,14 @@ class RigModel:
     ) -> Array:
         """States of :mod:`pneumo_ros.plant.equations`, (rows or N, 10)."""
         count = len(record.measured) if rows is None else rows
-        inputs = Inputs(record.commands[: count - 1], record.road[:count])
+        late = 0.0
         if nuisance is not None:
             late = float(nuisance[[p.name for p in self.parameters].index(COMMAND_DELAY)])
-            inputs = inputs._replace(commands=shifted(inputs.commands, late / record.period))
-        inputs = self.driven(inputs, record.period, active)[0]
+        commands, road = self._driven_by(record, count, late, active)
         start = self.initial(record, active)[0] if initial is None else initial
         plant = self.plant(nuisance, active)
         whole = self.step >= FIT_STEP and substeps(record.period, COARSEST) == 1
         steps = 1 if whole else substeps(record.period, self.step)
-        commands, road = np.ascontiguousarray(inputs.commands), np.ascontiguousarray(inputs.road)
         terms = self.terms(active)
         if not terms and correction is None:
             return simulate(start, commands, road, record.period, steps, *plant, self.surface)
