@@ -46,6 +46,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
 COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
+GAINS: Final = 0.5  # of the best short fit's gain: what another one must gain to be fitted to the end [numerics]
 EXCHANGED: Final = (4, 2)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
 MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which exchanges are tried [taste]
@@ -151,7 +152,7 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
         current = min(found, key=price)
         size = len(current.candidate.laws)
         known[size] = min(price(current), known.get(size, np.inf))
-        less = _one_less(problem, current) if size > 2 else None
+        less = _one_less(search, current) if size > 2 else None
         if less is not None and price(less) < known.get(size - 1, np.inf) - worth:
             search.structures.append(less)
             current, known[size - 1] = less, price(less)
@@ -176,6 +177,7 @@ def _rescanned(search: Search, found: Fit) -> bool:
     if not scanned:
         return False
     search.problem = problem = replace(problem, scanned=scanned)
+    search.exchange = None, None  # there is more to exchange for now
     search.logged = replace(search.logged, scanned=scanned)
     starts = [as_scanned(problem, law) for law in _compatible(problem, bare.candidate.laws)]
     short = short_fits(search, bare, [one for one in starts if one is not None], (0.89, 0.89))
@@ -189,18 +191,40 @@ def _much_left(search: Search, one: Scored) -> bool:
     return one.level > max(MISFIT, MISFIT_OF_REFIT * score(search.problem, search.refit).level)
 
 
-def _one_less(problem: Problem, found: Fit) -> Fit | None:
+def _one_less(search: Search, found: Fit) -> Fit | None:
     """The structure without one of its effects, the one that costs least to remove; the latest effect always stays.
 
     None where every smaller structure diverges."""
-    without = problem.each(
-        lambda law: reduced(problem, found, of_law(found.candidate, law), 2), found.candidate.laws[:-1]
-    )
+    problem = search.problem
+    without = problem.each(lambda law: _without(search, found, law), found.candidate.laws[:-1])
     best = min(without, key=lambda one: one.cost)
     return None if best.diverged else reduced(problem, best, (), STEPS)
 
 
+def _without(search: Search, found: Fit, law: Part) -> Fit:
+    """The structure without one of its effects, after few steps; kept for whoever asks next, until another is asked
+    for.
+    """
+    of, bare = search.bare
+    if of is not found:
+        search.bare = of, bare = found, {}
+    if law not in bare:
+        bare[law] = reduced(search.problem, found, of_law(found.candidate, law), 2)
+    return bare[law]
+
+
 def _one_exchanged(search: Search, found: Fit) -> Fit | None:
+    """:func:`_best_exchange` of a structure, which is asked for twice where it ends a climb: on the way and at the
+    end.
+    """
+    of, other = search.exchange
+    if of is not found:
+        other = _best_exchange(search, found)
+        search.exchange = found, other
+    return other
+
+
+def _best_exchange(search: Search, found: Fit) -> Fit | None:
     """The structure with one of its effects exchanged for another, or for another site: the best of those fitted.
 
     What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
@@ -212,7 +236,7 @@ def _one_exchanged(search: Search, found: Fit) -> Fit | None:
     simulated = trials(problem, found, beside)
 
     def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
-        bare = reduced(problem, found, of_law(found.candidate, law), 2)
+        bare = _without(search, found, law)
         if bare.diverged:
             return []
         others = [part for part in _compatible(problem, bare.candidate.laws) if part != law and part not in beside]
@@ -251,7 +275,7 @@ def _selected(search: Search, limits: Thresholds) -> Scored:
 
 
 def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
-    """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end."""
+    """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end at most."""
     problem, effort = search.problem, search.effort
     leader = refreshed(problem, base)
     others = _compatible(problem, base.candidate.laws)
@@ -262,7 +286,8 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     def ended(one: Fit) -> Fit:
         return _with_all_shapes(search, fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long))
 
-    return problem.each(ended, short[: counts[2]])
+    least = GAINS * (leader.cost - short[0].cost) if short else 0.0
+    return problem.each(ended, [one for one in short[: counts[2]] if leader.cost - one.cost >= least])
 
 
 def _with_all_shapes(search: Search, one: Fit) -> Fit:
@@ -294,7 +319,7 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
     for _ in range(PASSES):
         before = found
         for law in found.candidate.laws:
-            bare = reduced(problem, found, of_law(found.candidate, law), iterations=2)
+            bare = _without(search, found, law)
             found = found if bare.diverged else _exchanged(search, found, bare, law)
         if found is before:
             break

@@ -56,6 +56,8 @@ class Search:
     screened : screening of the singles at the refit, for the report
     lost : labels of candidates whose fit diverged
     visible : effect id -> rms in sigmas that its typical size would move the outputs by
+    bare : the structure that was last asked for without one of its effects, and what it comes to then, by effect
+    exchange : the structure of which an effect was last exchanged, and the best that it comes to
     """
 
     logged: Problem
@@ -69,6 +71,8 @@ class Search:
     screened: list[CandidateScore] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
     visible: dict[str, float] = field(default_factory=dict)
+    bare: tuple[Fit | None, dict[Part, Fit]] = field(default_factory=lambda: (None, {}))
+    exchange: tuple[Fit | None, Fit | None] = (None, None)
 
     @property
     def finalists(self) -> list[Fit]:
