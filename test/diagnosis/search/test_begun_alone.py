@@ -12,7 +12,7 @@ from helpers.rig_logs import excitation, signals_of
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
-from pneumo_ros.diagnosis.search.parts import with_shapes
+from pneumo_ros.diagnosis.search.parts import begun, with_shapes
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim
@@ -30,7 +30,9 @@ LIMITED = {"rising lag": 0.002, "falling lag": 0.002, "slew": 0.03}  # s, s, m/s
     [("valve_lag", "front", UNEVEN), ("exciter_lag", "both", UNEVEN), ("exciter_lag", "rear", LIMITED)],
 )
 def test_a_slow_part_is_found_by_its_shape(family: str, site: str, law: Mapping[str, float]) -> None:
-    """The shape that starts at nothing beside the law ends with more than the one that begins alone."""
+    """The shape that starts at nothing beside the law ends with more than the one that begins alone, whether it is
+    added to the law or came with it.
+    """
     model = RigModel(load_rig())
     name = f"{family}.shape"
     shape = model.library[name]
@@ -45,4 +47,9 @@ def test_a_slow_part_is_found_by_its_shape(family: str, site: str, law: Mapping[
         return with_shapes(problem, fit(problem, one, problem.start(one, None, typical), iterations=10), 10).cost
 
     without = RigModel(load_rig(), library={**model.library, name: replace(shape, begins=())})
-    assert left(Problem(without, (record,))) - left(Problem(model, (record,))) > 400.0  # 501, 1378 and 1043
+    problem = Problem(model, (record,))
+    assert left(Problem(without, (record,))) - left(problem) > 400.0  # 501, 1378 and 1043
+    both = Candidate(((family, site), (name, site)))
+    at_nothing = [0.0 if p.size else p.typical for p in problem.effect_parameters(both)]
+    came = fit(problem, both, problem.start(both, None, at_nothing), iterations=10)
+    assert came.cost - begun(problem, came, (family, site), 10).cost > 400.0

@@ -158,6 +158,7 @@ def test_an_effect_at_the_wrong_site_is_exchanged_for_the_right_one() -> None:
     other = _one_exchanged(search, found)
     assert other is not None and set(other.candidate.laws) == {("a", ""), ("gauge", "both")}
     assert score(problem, other).price < score(problem, found).price
+    assert _one_exchanged(search, found) is other  # worked out once
 
 
 def test_what_a_law_does_nothing_like_is_tried_by_its_shape_alone() -> None:
