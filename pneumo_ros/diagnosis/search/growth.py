@@ -137,6 +137,8 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
     current, known, exchanges = start.fit, {start.size: start.price}, EXCHANGES
     for number in range(ROUNDS):
         search.progress(0.84 + 0.05 * number / ROUNDS, f"beside {current.candidate.label}")
+        if _much_left(search, score(problem, current)):
+            current = _begun_anew(search, current)
         while exchanges and _much_left(search, score(problem, current)):
             other = _one_exchanged(search, current)
             exchanges -= 1
@@ -158,6 +160,18 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
             current, known[size - 1] = less, price(less)
         if not room_for_more(search):
             break
+
+
+def _begun_anew(search: Search, found: Fit) -> Fit:
+    """The structure with the shapes of its earlier effects begun alone once more: what they did beside fewer effects is
+    where small steps keep them, and no more what they do best.
+    """
+    best = found
+    for law in found.candidate.laws[:-1]:
+        best = begun(search.problem, best, law, search.effort.long)
+    if best is not found:
+        search.structures.append(best)
+    return best
 
 
 def _rescanned(search: Search, found: Fit) -> bool:
