@@ -12,7 +12,9 @@ from helpers.rig_logs import excitation, signals_of
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
+from pneumo_ros.diagnosis.search.growth import _begun_anew
 from pneumo_ros.diagnosis.search.parts import begun, with_shapes
+from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim
@@ -53,3 +55,24 @@ def test_a_slow_part_is_found_by_its_shape(family: str, site: str, law: Mapping[
     at_nothing = [0.0 if p.size else p.typical for p in problem.effect_parameters(both)]
     came = fit(problem, both, problem.start(both, None, at_nothing), iterations=10)
     assert came.cost - begun(problem, came, (family, site), 10).cost > 400.0
+
+
+def test_a_slow_part_is_begun_anew_beside_what_has_come_since() -> None:
+    model = RigModel(load_rig())
+    shape = model.library["exciter_lag.shape"]
+    truth = tuple(min({"follower": 1.0, **LIMITED}.get(p.name, 0.0), p.high) for p in shape.parameters)
+    road, commands = excitation(SECONDS, 4)
+    acting = (Active("exciter_lag.shape", "rear", truth), Active("coulomb_friction", "front", (8.0, 3e-4, 0.0)))
+    clean = model.simulate(driven(road, commands), None, trim(model.rig).state, acting)
+    problem = Problem(model, (signals_of(clean, road, commands, 4, "steps"),))
+    nominal = Candidate()
+    search = Search(
+        problem, problem, fit(problem, nominal, problem.start(nominal, None, ())), Effort(), lambda *_: None
+    )
+    grown = Candidate((("exciter_lag", "rear"), ("exciter_lag.shape", "rear"), ("coulomb_friction", "front")))
+    at_nothing = [0.0 if p.size else p.typical for p in problem.effect_parameters(grown)]
+    found = fit(problem, grown, problem.start(grown, None, at_nothing), iterations=10)
+    anew = _begun_anew(search, found)
+    assert search.structures == [anew] and found.cost - anew.cost > 400.0
+    slew = [p.name for p in problem.effect_parameters(grown)].index("slew")
+    assert problem.values(grown, anew.x)[slew] == pytest.approx(LIMITED["slew"], rel=0.1)
