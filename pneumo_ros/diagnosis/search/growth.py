@@ -8,24 +8,30 @@ close: the misfit of a law must not pass for a second effect.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
+from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged, without
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
-from pneumo_ros.diagnosis.search.parts import STEPS, beginnings, begun, reduced, rival, shaped, shapes_of, with_shapes
+from pneumo_ros.diagnosis.search.parts import (
+    STEPS,
+    begun,
+    reduced,
+    shaped,
+    with_all_shapes,
+    with_own_shape,
+)
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
-    all_parts,
     as_scanned,
     candidate_scores,
-    compatible,
+    compatible_parts,
     trials,
 )
 from pneumo_ros.diagnosis.search.selection import (
@@ -47,7 +53,6 @@ MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
 COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
 GAINS: Final = 0.5  # of the best short fit's gain: what another one must gain to be fitted to the end [numerics]
-EXCHANGED: Final = (4, 2)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
 MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which exchanges are tried [taste]
 MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
@@ -56,7 +61,6 @@ STEP: Final = 0.3
 EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
 POLISHES: Final = 3  # exchanges tried at the end, however little is left [numerics]
 PASSES: Final = 2  # over the effects of the best structure, exchanging each; the second where the first did [numerics]
-RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 CLOSE: Final = 12.0  # log weight that a structure of other families may be behind to be fitted to the end [numerics]
 ENDED: Final = 3  # structures of as many effects that are fitted to the end [numerics]
 # Share (rms) of what the refit leaves, above which a structure leaves most of it: then singles are looked for by their
@@ -115,7 +119,7 @@ def _by_shapes(search: Search) -> list[Fit]:
     problem, effort = search.problem, search.effort
     search.progress(0.83, "every family by its shape")
     base = refreshed(problem, search.refit)
-    ranked = probed(problem, base, [_with_shape(problem, one) for one in search.screened])
+    ranked = probed(problem, base, [with_own_shape(problem, one) for one in search.screened])
     of_place: dict[str, CandidateScore] = {}
     for one in ranked:  # probes are short: what a place's best family comes to, a fit shows
         of_place.setdefault(problem.model.places(Active(*one.parts[0], ()))[0], one)
@@ -140,7 +144,7 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
         if _much_left(search, score(problem, current)):
             current = _begun_anew(search, current)
         while exchanges and _much_left(search, score(problem, current)):
-            other = _one_exchanged(search, current)
+            other = one_exchanged(search, current)
             exchanges -= 1
             if other is None or price(other) > price(current) - worth:
                 break
@@ -193,7 +197,7 @@ def _rescanned(search: Search, found: Fit) -> bool:
     search.problem = problem = replace(problem, scanned=scanned)
     search.exchange = None, None  # there is more to exchange for now
     search.logged = replace(search.logged, scanned=scanned)
-    starts = [as_scanned(problem, law) for law in _compatible(problem, bare.candidate.laws)]
+    starts = [as_scanned(problem, law) for law in compatible_parts(problem, bare.candidate.laws)]
     short = short_fits(search, bare, [one for one in starts if one is not None], (0.89, 0.89))
     if short:
         search.structures.append(sharpened(problem, short[0], search.effort.long))
@@ -210,60 +214,9 @@ def _one_less(search: Search, found: Fit) -> Fit | None:
 
     None where every smaller structure diverges."""
     problem = search.problem
-    without = problem.each(lambda law: _without(search, found, law), found.candidate.laws[:-1])
-    best = min(without, key=lambda one: one.cost)
+    fewer = problem.each(lambda law: without(search, found, law), found.candidate.laws[:-1])
+    best = min(fewer, key=lambda one: one.cost)
     return None if best.diverged else reduced(problem, best, (), STEPS)
-
-
-def _without(search: Search, found: Fit, law: Part) -> Fit:
-    """The structure without one of its effects, after few steps; kept for whoever asks next, until another is asked
-    for.
-    """
-    of, bare = search.bare
-    if of is not found:
-        search.bare = of, bare = found, {}
-    if law not in bare:
-        bare[law] = reduced(search.problem, found, of_law(found.candidate, law), 2)
-    return bare[law]
-
-
-def _one_exchanged(search: Search, found: Fit) -> Fit | None:
-    """:func:`_best_exchange` of a structure, which is asked for twice where it ends a climb: on the way and at the
-    end.
-    """
-    of, other = search.exchange
-    if of is not found:
-        other = _best_exchange(search, found)
-        search.exchange = found, other
-    return other
-
-
-def _best_exchange(search: Search, found: Fit) -> Fit | None:
-    """The structure with one of its effects exchanged for another, or for another site: the best of those fitted.
-
-    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
-    of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
-    What may act beside all of them is simulated once, beside all of them: what it changes hardly depends on one.
-    """
-    problem = search.problem
-    beside = _compatible(problem, found.candidate.laws)
-    simulated = trials(problem, found, beside)
-
-    def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
-        bare = _without(search, found, law)
-        if bare.diverged:
-            return []
-        others = [part for part in _compatible(problem, bare.candidate.laws) if part != law and part not in beside]
-        tried = [*simulated, *trials(problem, bare, others)]
-        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED[0], 2)
-        probes = problem.each(lambda one: (*probed_one(problem, bare, _with_shape(problem, one)), bare), screened)
-        return sorted(probes, key=lambda item: item[0])[:1]
-
-    each = problem.each(instead, found.candidate.laws)
-    chosen = sorted((one for some in each for one in some), key=lambda item: item[0])[: EXCHANGED[1]]
-    short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
-    ended = problem.each(lambda one: _with_all_shapes(search, one), short)
-    return min(ended, key=lambda one: score(problem, one).price, default=None)
 
 
 def _polished(search: Search, best: Scored, limits: Thresholds) -> Scored:
@@ -272,7 +225,7 @@ def _polished(search: Search, best: Scored, limits: Thresholds) -> Scored:
     """
     refit, found = score(search.problem, search.refit), best
     for _ in range(POLISHES):
-        other = _one_exchanged(search, found.fit)
+        other = one_exchanged(search, found.fit)
         if other is None:
             break
         search.structures.append(other)
@@ -292,39 +245,17 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end at most."""
     problem, effort = search.problem, search.effort
     leader = refreshed(problem, base)
-    others = _compatible(problem, base.candidate.laws)
+    others = compatible_parts(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
-    chosen = probed(problem, leader, [_with_shape(problem, one) for one in screened])[: counts[1]]
+    chosen = probed(problem, leader, [with_own_shape(problem, one) for one in screened])[: counts[1]]
     short = short_fits(search, leader, chosen, (0.86, 0.86))
 
     def ended(one: Fit) -> Fit:
-        return _with_all_shapes(search, fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long))
+        found = fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long)
+        return with_all_shapes(problem, found, effort.short)
 
     least = GAINS * (leader.cost - short[0].cost) if short else 0.0
     return problem.each(ended, [one for one in short[: counts[2]] if leader.cost - one.cost >= least])
-
-
-def _with_all_shapes(search: Search, one: Fit) -> Fit:
-    """A structure whose last law has come just now, with the shapes that it lacks, and its own also begun alone."""
-    problem, steps = search.problem, search.effort.short
-    return with_shapes(problem, begun(problem, one, one.candidate.laws[-1], steps), steps)
-
-
-def _with_shape(problem: Problem, one: CandidateScore) -> CandidateScore:
-    """A screened effect with its family's shape at nothing, where that needs no screening of its own."""
-    if len(one.parts) > 1:
-        return one
-    missing = shapes_of(problem.model, Candidate(one.parts))
-    if any(p.starts and not p.size for part in missing for p in problem.parameters_of[part]):
-        return one
-    found = dict(zip((p.name for p in problem.parameters_of[one.parts[0]]), one.values, strict=True))
-    more = [value for part in missing for value in beginnings(problem, part, found)]
-    return replace(one, parts=(*one.parts, *missing), values=(*one.values, *more))
-
-
-def _compatible(problem: Problem, laws: Sequence[Part]) -> list[Part]:
-    """Parts of the library that may act beside all of ``laws``, see :func:`compatible`."""
-    return [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
 
 
 def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
@@ -333,17 +264,17 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
     for _ in range(PASSES):
         before = found
         for law in found.candidate.laws:
-            bare = _without(search, found, law)
-            found = found if bare.diverged else _exchanged(search, found, bare, law)
+            bare = without(search, found, law)
+            found = found if bare.diverged else exchanged_in_place(search, found, bare, law)
         if found is before:
             break
     for law in found.candidate.laws:
         if len(found.candidate.laws) < 2:
             break
-        without = reduced(problem, found, of_law(found.candidate, law))
-        more, less = score(problem, found), score(problem, without)
-        if gained(less, more) < limits.second or without.cost - found.cost < limits.second_cost:
-            found = without
+        fewer = reduced(problem, found, of_law(found.candidate, law))
+        more, less = score(problem, found), score(problem, fewer)
+        if gained(less, more) < limits.second or fewer.cost - found.cost < limits.second_cost:
+            found = fewer
     if found is not best.fit:
         search.structures.append(found)
 
@@ -361,24 +292,6 @@ def _end(search: Search, best: Scored) -> None:
         if len(leading) > 1 and log_weight(one, refit) > log_weight(leading[0], refit) - CLOSE:
             old = one.fit
             search.structures.append(fit(problem, old.candidate, old.x, old.jacobian, iterations=search.effort.long))
-
-
-def _exchanged(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
-    """The likeliest of a structure and those with one effect exchanged for the best rivals of its place: the one that
-    the probes prefer and, because these are short, the one that the screening does, or the next.
-    """
-    problem, effort = search.problem, search.effort
-    bare = refreshed(problem, bare)
-    rivals = [part for part in _compatible(problem, bare.candidate.laws) if rival(problem, law, part)]
-    screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
-    screened = [_with_shape(problem, one) for one in screened]
-    ranked = probed(problem, bare, screened)
-    promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
-    chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
-    short = short_fits(search, bare, chosen, (0.9, 0.9))
-    others = problem.each(lambda one: _with_all_shapes(search, one), short)
-    search.structures += others  # the worse ones as well: they may be as likely
-    return likeliest(score(problem, search.refit), [score(problem, one) for one in (found, *others)]).fit
 
 
 def _without_idle_shapes(search: Search, found: Fit) -> Fit:

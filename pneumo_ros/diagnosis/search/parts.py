@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted
-from pneumo_ros.diagnosis.search.screening import candidate_scores, trials
+from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, trials
 from pneumo_ros.diagnosis.search.selection import FORM, score
 from pneumo_ros.diagnosis.traits import BeginsAlone
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
@@ -82,6 +83,23 @@ def begun(problem: Problem, one: Fit, law: Part, iterations: int) -> Fit:
     best = min(probes, key=lambda other: other.cost)
     other = fit(problem, one.candidate, best.x, None, iterations=iterations)
     return other if other.cost < one.cost and _left(problem, other) < _left(problem, one) else one
+
+
+def with_all_shapes(problem: Problem, one: Fit, iterations: int) -> Fit:
+    """A structure whose last law has come just now, with the shapes that it lacks, and its own also begun alone."""
+    return with_shapes(problem, begun(problem, one, one.candidate.laws[-1], iterations), iterations)
+
+
+def with_own_shape(problem: Problem, one: CandidateScore) -> CandidateScore:
+    """A screened effect with its family's shape at nothing, where that needs no screening of its own."""
+    if len(one.parts) > 1:
+        return one
+    missing = shapes_of(problem.model, Candidate(one.parts))
+    if any(p.starts and not p.size for part in missing for p in problem.parameters_of[part]):
+        return one
+    found = dict(zip((p.name for p in problem.parameters_of[one.parts[0]]), one.values, strict=True))
+    more = [value for part in missing for value in beginnings(problem, part, found)]
+    return replace(one, parts=(*one.parts, *missing), values=(*one.values, *more))
 
 
 def _left(problem: Problem, one: Fit) -> float:

@@ -201,6 +201,11 @@ def compatible(model: Model, one: Part, other: Part) -> bool:
     return family_of(one[0]) != family_of(other[0]) or (one[1] != other[1] and "both" not in (one[1], other[1]))
 
 
+def compatible_parts(problem: Problem, laws: Sequence[Part]) -> list[Part]:
+    """Parts of the library that may act beside all of ``laws``, see :func:`compatible`."""
+    return [p for p in all_parts(problem) if all(compatible(problem.model, law, p) for law in laws)]
+
+
 def _signed(problem: Problem, trial: Trial) -> bool:
     """Whether the sizes of a trial may be negative."""
     return all(p.low < 0.0 for p in problem.effect_parameters(Candidate(trial.parts)) if p.size)

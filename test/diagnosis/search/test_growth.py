@@ -15,7 +15,8 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit, secant
 from pneumo_ros.diagnosis.model import PlainEffect
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.growth import MISFIT, _one_exchanged, _one_more, _polished, grow
+from pneumo_ros.diagnosis.search.exchange import one_exchanged
+from pneumo_ros.diagnosis.search.growth import MISFIT, _one_more, _polished, grow
 from pneumo_ros.diagnosis.search.parts import rival
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import Thresholds, likeliest, score, select
@@ -155,10 +156,10 @@ def test_an_effect_at_the_wrong_site_is_exchanged_for_the_right_one() -> None:
     search = compete(problem, Effort(), False, lambda share, what: None)
     wrong = Candidate((("a", ""), ("gauge", "left")))
     found = fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3)))
-    other = _one_exchanged(search, found)
+    other = one_exchanged(search, found)
     assert other is not None and set(other.candidate.laws) == {("a", ""), ("gauge", "both")}
     assert score(problem, other).price < score(problem, found).price
-    assert _one_exchanged(search, found) is other  # worked out once
+    assert one_exchanged(search, found) is other  # worked out once
 
 
 def test_what_a_law_does_nothing_like_is_tried_by_its_shape_alone() -> None:
@@ -209,7 +210,7 @@ def test_what_takes_an_effects_place_is_probed_with_its_shape() -> None:
     problem = Problem(Sided(effects=effects), (made({"a": 1.0, "c": 0.2, "b": 1.0, "d": 0.4}),))
     search = compete(problem, Effort(), False, lambda share, what: None)
     wrong = Candidate((("a", ""), ("scale", "left")))
-    other = _one_exchanged(search, fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3))))
+    other = one_exchanged(search, fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3))))
     assert other is not None and set(other.candidate.laws) == {("a", ""), ("gauge", "left")}
     assert other.candidate.shapes == (("gauge.shape", "left"),)
 

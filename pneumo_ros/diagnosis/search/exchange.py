@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An effect of a structure in exchange for another: for any other, and for the rivals of its place."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pneumo_ros.diagnosis.fit.problem import Part
+from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
+from pneumo_ros.diagnosis.search.parts import reduced, rival, with_all_shapes, with_own_shape
+from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, compatible_parts, trials
+from pneumo_ros.diagnosis.search.selection import likeliest, score
+from pneumo_ros.diagnosis.search.state import Search
+from pneumo_ros.effects.parameters import family_of
+
+EXCHANGED: Final = (4, 2)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
+RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
+
+
+def without(search: Search, found: Fit, law: Part) -> Fit:
+    """The structure without one of its effects, after few steps; kept for whoever asks next, until another is asked
+    for.
+    """
+    of, bare = search.bare
+    if of is not found:
+        search.bare = of, bare = found, {}
+    if law not in bare:
+        bare[law] = reduced(search.problem, found, of_law(found.candidate, law), 2)
+    return bare[law]
+
+
+def one_exchanged(search: Search, found: Fit) -> Fit | None:
+    """:func:`_best_exchange` of a structure, which is asked for twice where it ends a climb: on the way and at the
+    end.
+    """
+    of, other = search.exchange
+    if of is not found:
+        other = _best_exchange(search, found)
+        search.exchange = found, other
+    return other
+
+
+def _best_exchange(search: Search, found: Fit) -> Fit | None:
+    """The structure with one of its effects exchanged for another, or for another site: the best of those fitted.
+
+    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
+    of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
+    What may act beside all of them is simulated once, beside all of them: what it changes hardly depends on one.
+    """
+    problem = search.problem
+    beside = compatible_parts(problem, found.candidate.laws)
+    simulated = trials(problem, found, beside)
+
+    def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
+        bare = without(search, found, law)
+        if bare.diverged:
+            return []
+        others = [part for part in compatible_parts(problem, bare.candidate.laws) if part != law and part not in beside]
+        tried = [*simulated, *trials(problem, bare, others)]
+        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED[0], 2)
+        probes = problem.each(lambda one: (*probed_one(problem, bare, with_own_shape(problem, one)), bare), screened)
+        return sorted(probes, key=lambda item: item[0])[:1]
+
+    each = problem.each(instead, found.candidate.laws)
+    chosen = sorted((one for some in each for one in some), key=lambda item: item[0])[: EXCHANGED[1]]
+    short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
+    ended = problem.each(lambda one: with_all_shapes(problem, one, search.effort.short), short)
+    return min(ended, key=lambda one: score(problem, one).price, default=None)
+
+
+def exchanged_in_place(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
+    """The likeliest of a structure and those with one effect exchanged for the best rivals of its place: the one that
+    the probes prefer and, because these are short, the one that the screening does, or the next.
+    """
+    problem, effort = search.problem, search.effort
+    bare = refreshed(problem, bare)
+    rivals = [part for part in compatible_parts(problem, bare.candidate.laws) if rival(problem, law, part)]
+    screened = candidate_scores(problem, bare, trials(problem, bare, rivals))[: effort.exchanged]
+    screened = [with_own_shape(problem, one) for one in screened]
+    ranked = probed(problem, bare, screened)
+    promising = dict.fromkeys(family_of(one.parts[0][0]) for one in (*ranked[:1], *screened[:1], *ranked))
+    chosen = [next(e for e in ranked if family_of(e.parts[0][0]) == family) for family in list(promising)[:RIVALS]]
+    short = short_fits(search, bare, chosen, (0.9, 0.9))
+    others = problem.each(lambda one: with_all_shapes(problem, one, effort.short), short)
+    search.structures += others  # the worse ones as well: they may be as likely
+    return likeliest(score(problem, search.refit), [score(problem, one) for one in (found, *others)]).fit
