@@ -151,14 +151,11 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
             continue
         law = is_law(part[0])
         beside = law and any(family_of(s[0]) == family_of(part[0]) for s in fit.candidate.shapes)
-        over = sum(_crosses(p, value) for p, value in stuck)
-        sizes = sum(p.size or _crosses(p, value) for p, value in stuck)
-        firm += (
-            over
-            + (sizes - over) * (0.5 if beside else 1.0)
-            + (0.5 if law and not beside and len(stuck) > sizes else 0.0)
-        )
-        bent += 0.0 if law else 0.5 * (len(stuck) - sizes)
+        crossed = sum(_crosses(p, value) for p, value in stuck)
+        sizes = sum(p.size and not _crosses(p, value) for p, value in stuck)
+        shaping = len(stuck) - crossed - sizes
+        firm += crossed + sizes * (0.5 if beside else 1.0) + (0.5 if law and not beside and shaping else 0.0)
+        bent += 0.0 if law else 0.5 * shaping
     return firm, bent
 
 

@@ -19,21 +19,8 @@ from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged, without
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
-from pneumo_ros.diagnosis.search.parts import (
-    STEPS,
-    begun,
-    reduced,
-    shaped,
-    with_all_shapes,
-    with_own_shape,
-)
-from pneumo_ros.diagnosis.search.screening import (
-    CandidateScore,
-    as_scanned,
-    candidate_scores,
-    compatible_parts,
-    trials,
-)
+from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
+from pneumo_ros.diagnosis.search.screening import CandidateScore, as_scanned, candidate_scores, compatible_parts, trials
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
     THIRD,
