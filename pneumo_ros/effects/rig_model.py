@@ -188,7 +188,7 @@ class RigModel:
         """
         acting = tuple(one for one in (*self.configured, *active) if self.library[one.effect].inputs is not None)
         key = (id(record), count, late, acting)
-        known = self._driven.get(key)
+        known = self._inputs_kept.get(key)
         if known is not None and known[0] is record:
             return known[1]
         inputs = Inputs(record.commands[: count - 1], record.road[:count])
@@ -196,13 +196,13 @@ class RigModel:
             inputs = inputs._replace(commands=shifted(inputs.commands, late / record.period))
         commands, road = self.driven(inputs, record.period, active)[0]
         inputs = Inputs(np.ascontiguousarray(commands), np.ascontiguousarray(road))
-        if len(self._driven) >= DRIVEN:
-            self._driven.clear()
-        self._driven[key] = (record, inputs)
+        if len(self._inputs_kept) >= DRIVEN:
+            self._inputs_kept.clear()
+        self._inputs_kept[key] = (record, inputs)
         return inputs
 
     @cached_property
-    def _driven(self) -> dict[tuple[int, int, float, tuple[Active, ...]], tuple[Drive, Inputs]]:
+    def _inputs_kept(self) -> dict[tuple[int, int, float, tuple[Active, ...]], tuple[Drive, Inputs]]:
         return {}
 
     def simulate_channels(self, state: Array) -> Array:
