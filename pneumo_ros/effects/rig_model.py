@@ -41,7 +41,7 @@ from pneumo_ros.rig import Rig
 from pneumo_ros.rig.channels import CHANNELS
 
 FIT_STEP = 2e-3  # s: one RK4 step a sample at 500 Hz
-COARSEST = 4e-3  # s: one step of a coarse record, for sensitivities only
+COARSEST = 4.2e-3  # s: one step of a coarse record, for sensitivities only; 500 Hz in pairs by a clock that runs slow
 Memories = tuple[Memory, ...]  # one an effect; empty before the first block
 STILL = 1e-10  # m2
 PLANTS = 64  # kept at a time

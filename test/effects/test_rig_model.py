@@ -7,9 +7,11 @@ import numpy as np
 from helpers.own_logs import driven
 from helpers.rig_logs import excitation, signals_of
 
+from pneumo_ros.diagnosis.fit.problem import COARSE_BELOW
 from pneumo_ros.effects.nuisance import COMMAND_DELAY
 from pneumo_ros.effects.parameters import Active
-from pneumo_ros.effects.rig_model import DRIVEN, RigModel
+from pneumo_ros.effects.rig_model import COARSEST, DRIVEN, FIT_STEP, RigModel
+from pneumo_ros.plant.integrator import substeps
 from pneumo_ros.plant.trim import trim
 from pneumo_ros.rig import load_rig
 
@@ -29,3 +31,8 @@ def test_what_commands_come_to_is_kept_only_for_the_same_log_delay_and_effects()
     for log, values, lag in asked * (2 + DRIVEN // len(asked)):  # more often than it keeps
         (wanted,) = (e for e, (a, b, c) in zip(expected, asked, strict=True) if a is log and b is values and c == lag)
         assert np.array_equal(used.predict(log, values, state, lag), wanted)
+
+
+def test_a_log_that_is_halved_by_a_clock_that_runs_slow_still_takes_one_step_a_row() -> None:
+    # Three of the finer steps a row would make the coarse log dearer than the whole one.
+    assert FIT_STEP * 1.002 < COARSE_BELOW and substeps(2.0 * COARSE_BELOW, COARSEST) == 1

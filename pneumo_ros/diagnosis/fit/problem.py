@@ -28,7 +28,7 @@ from pneumo_ros.effects.parameters import Active, EffectParameter, is_law
 
 # Share of a channel's std below which a model of this kind is not asked to explain anything [taste]
 MODEL_FORM_FLOOR: Final = 2.5e-3
-COARSE_BELOW: Final = 2.5e-3  # s between rows; a slower log is not halved for its sensitivities [numerics]
+COARSE_BELOW: Final = 2.1e-3  # s between rows; a slower log is not halved for its sensitivities [numerics]
 REACH: Final = 3.0  # prior sigmas that a nuisance parameter may move [taste]
 # Mean square of the tolerances, prior sigmas, from which on a structure strains them; one is as told [taste]
 STRAINED: Final = 1.5
