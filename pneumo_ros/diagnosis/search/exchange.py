@@ -14,7 +14,7 @@ from pneumo_ros.diagnosis.search.selection import likeliest, score
 from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import family_of
 
-EXCHANGED: Final = (4, 2)  # exchanges probed for each effect; those of so many effects fitted shortly [numerics]
+EXCHANGED: Final = 4  # exchanges probed for each effect [numerics]
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 
 
@@ -42,11 +42,11 @@ def one_exchanged(search: Search, found: Fit) -> Fit | None:
 
 
 def _best_exchange(search: Search, found: Fit) -> Fit | None:
-    """The structure with one of its effects exchanged for another, or for another site: the best of those fitted.
+    """The structure with one of its effects exchanged for another, or for another site; None where nothing may.
 
-    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best one
-    of each of the most promising effects is fitted: the effect that a structure misses least need not be the wrong one.
-    What may act beside all of them is simulated once, beside all of them: what it changes hardly depends on one.
+    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best of
+    all is fitted: the effect that a structure misses least need not be the wrong one. What may act beside all of them
+    is simulated once, beside all of them: what it changes hardly depends on one.
     """
     problem = search.problem
     beside = compatible_parts(problem, found.candidate.laws)
@@ -58,15 +58,15 @@ def _best_exchange(search: Search, found: Fit) -> Fit | None:
             return []
         others = [part for part in compatible_parts(problem, bare.candidate.laws) if part != law and part not in beside]
         tried = [*simulated, *trials(problem, bare, others)]
-        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED[0], 2)
-        probes = problem.each(lambda one: (*probed_one(problem, bare, with_own_shape(problem, one)), bare), screened)
-        return sorted(probes, key=lambda item: item[0])[:1]
+        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED, 2)
+        return problem.each(lambda one: (*probed_one(problem, bare, with_own_shape(problem, one)), bare), screened)
 
-    each = problem.each(instead, found.candidate.laws)
-    chosen = sorted((one for some in each for one in some), key=lambda item: item[0])[: EXCHANGED[1]]
-    short = [one for _, entry, bare in chosen for one in short_fits(search, bare, [entry], (0.86, 0.86))]
-    ended = problem.each(lambda one: with_all_shapes(problem, one, search.effort.short), short)
-    return min(ended, key=lambda one: score(problem, one).price, default=None)
+    probes = [one for some in problem.each(instead, found.candidate.laws) for one in some]
+    if not probes:
+        return None
+    _, entry, bare = min(probes, key=lambda item: item[0])
+    short = short_fits(search, bare, [entry], (0.86, 0.86))
+    return with_all_shapes(problem, short[0], search.effort.short) if short else None
 
 
 def exchanged_in_place(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:

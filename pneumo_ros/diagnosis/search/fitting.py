@@ -46,8 +46,13 @@ def probed(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> l
     """The screened candidates in the order of their training costs after :data:`PROBE` cheap steps, with the values
     those end at: the screening is linear, and a typical size may be far from the true one.
     """
-    ranked = problem.each(lambda entry: probed_one(problem, base, entry), screened)
-    return [entry for _, entry in sorted(ranked, key=lambda item: item[0])]
+    return [entry for _, entry in ranked(problem, base, screened)]
+
+
+def ranked(problem: Problem, base: Fit, screened: Sequence[CandidateScore]) -> list[tuple[float, CandidateScore]]:
+    """:func:`probed`, with the training costs."""
+    probes = problem.each(lambda entry: probed_one(problem, base, entry), screened)
+    return sorted(probes, key=lambda item: item[0])
 
 
 def probed_one(problem: Problem, base: Fit, entry: CandidateScore) -> tuple[float, CandidateScore]:

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Problem
+from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged, without
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, short_fits, varied
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
 from pneumo_ros.diagnosis.search.screening import CandidateScore, as_scanned, candidate_scores, compatible_parts, trials
@@ -39,7 +39,9 @@ from pneumo_ros.effects.parameters import Active, family_of
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
 COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
-GAINS: Final = 0.5  # of the best short fit's gain: what another one must gain to be fitted to the end [numerics]
+# Of the best one's gain: what another one must gain by its probe to be fitted shortly, by that to be fitted to the end
+# [numerics]
+GAINS: Final = (0.5, 0.8)
 ROUNDS: Final = 9  # additions and exchanges at most [numerics]
 MISFIT: Final = 1.0  # mean square on the kept blocks, sigma squared, above which exchanges are tried [taste]
 MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
@@ -47,7 +49,6 @@ MISFIT_OF_REFIT: Final = 0.001  # the same as a share of the refit's [taste]
 STEP: Final = 0.3
 EXCHANGES: Final = 6  # exchanges tried on the way [numerics]
 POLISHES: Final = 3  # exchanges tried at the end, however little is left [numerics]
-PASSES: Final = 2  # over the effects of the best structure, exchanging each; the second where the first did [numerics]
 CLOSE: Final = 12.0  # log weight that a structure of other families may be behind to be fitted to the end [numerics]
 ENDED: Final = 3  # structures of as many effects that are fitted to the end [numerics]
 # Share (rms) of what the refit leaves, above which a structure leaves most of it: then singles are looked for by their
@@ -106,9 +107,9 @@ def _by_shapes(search: Search) -> list[Fit]:
     problem, effort = search.problem, search.effort
     search.progress(0.83, "every family by its shape")
     base = refreshed(problem, search.refit)
-    ranked = probed(problem, base, [with_own_shape(problem, one) for one in search.screened])
+    likely = probed(problem, base, [with_own_shape(problem, one) for one in search.screened])
     of_place: dict[str, CandidateScore] = {}
-    for one in ranked:  # probes are short: what a place's best family comes to, a fit shows
+    for one in likely:  # probes are short: what a place's best family comes to, a fit shows
         of_place.setdefault(problem.model.places(Active(*one.parts[0], ()))[0], one)
     short = short_fits(search, base, list(of_place.values())[: BY_SHAPES[0]], (0.83, 0.84))[: BY_SHAPES[1]]
     return problem.each(lambda one: fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long), short)
@@ -234,27 +235,29 @@ def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) 
     leader = refreshed(problem, base)
     others = compatible_parts(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
-    chosen = probed(problem, leader, [with_own_shape(problem, one) for one in screened])[: counts[1]]
-    short = short_fits(search, leader, chosen, (0.86, 0.86))
+    probes = ranked(problem, leader, [with_own_shape(problem, one) for one in screened])[: counts[1]]
+    chosen = [one for cost, one in probes if leader.cost - cost >= GAINS[0] * (leader.cost - probes[0][0])]
+    short = short_fits(search, leader, chosen or [one for _, one in probes], (0.86, 0.86))
 
     def ended(one: Fit) -> Fit:
         found = fit(problem, one.candidate, one.x, one.jacobian, iterations=effort.long)
         return with_all_shapes(problem, found, effort.short)
 
-    least = GAINS * (leader.cost - short[0].cost) if short else 0.0
+    least = GAINS[1] * (leader.cost - short[0].cost) if short else 0.0
     return problem.each(ended, [one for one in short[: counts[2]] if leader.cost - one.cost >= least])
 
 
 def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
     """Each effect of the best structure against its rivals of the same place, and against its absence."""
     problem, found = search.problem, best.fit
-    for _ in range(PASSES):
-        before = found
-        for law in found.candidate.laws:
-            bare = without(search, found, law)
-            found = found if bare.diverged else exchanged_in_place(search, found, bare, law)
-        if found is before:
-            break
+    seen: set[Part] = set()
+    while law := next((one for one in found.candidate.laws if one not in seen), None):
+        seen.add(law)
+        bare = without(search, found, law)
+        other = found if bare.diverged else exchanged_in_place(search, found, bare, law)
+        if other is not found and found is best.fit:  # those before the first exchange once more, beside what it made
+            seen = set(other.candidate.laws) - set(found.candidate.laws)
+        found = other
     for law in found.candidate.laws:
         if len(found.candidate.laws) < 2:
             break
