@@ -12,15 +12,16 @@ from helpers.driven_log import DrivenLog
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
-from pneumo_ros.diagnosis.fit.solver import fit, secant
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, secant
 from pneumo_ros.diagnosis.model import PlainEffect
+from pneumo_ros.diagnosis.search import growth
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.exchange import one_exchanged
-from pneumo_ros.diagnosis.search.growth import MISFIT, _one_more, _polished, grow
+from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged
+from pneumo_ros.diagnosis.search.growth import MISFIT, _one_more, _polished, _refine, grow
 from pneumo_ros.diagnosis.search.parts import rival
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import Thresholds, likeliest, score, select
-from pneumo_ros.diagnosis.search.state import Effort
+from pneumo_ros.diagnosis.search.state import Effort, Search
 from pneumo_ros.effects.parameters import Active, EffectParameter, Parameter
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.rig import load_rig
@@ -187,6 +188,36 @@ def test_a_further_effect_is_probed_with_its_shape() -> None:
     (found,) = _one_more(search, base, (10, 1, 1))
     law = found.candidate.laws[1]
     assert law[0] == "gauge" and found.candidate.shapes == (("gauge.shape", law[1]),)
+
+
+@pytest.mark.parametrize(("second", "fitted"), [(0.95, {"b", "c"}), (0.85, {"b"}), (0.5, {"b"})])
+def test_only_what_gains_nearly_as_much_as_the_best_is_fitted_to_the_end(second: float, fitted: set[str]) -> None:
+    effects = {name: one for name, one in _effects().items() if name in TRUE}
+    problem = Problem(Sum(effects=effects), (made({"a": 2.0, "b": 1.0, "c": second, "d": 0.2}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    first = Candidate((("a", ""),))
+    found = _one_more(search, fit(problem, first, problem.start(first, None, (0.3,))))
+    assert {one.candidate.laws[1][0] for one in found} == fitted
+
+
+def test_after_an_exchange_the_effects_before_it_are_looked_at_once_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    size = _effects()["a"].parameters
+    sites = {"a": "", "d": "", "scale": "left", "gauge": "left", "gauge.shape": "left"}
+    effects = {name: PlainEffect(name, (site,), size) for name, site in sites.items()}
+    problem = Problem(Sided(effects=effects), (made({"a": 1.0, "d": 0.5, "c": 0.2, "b": 1.0}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    asked: list[str] = []
+
+    def watched(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:
+        asked.append(law[0])
+        return exchanged_in_place(search, found, bare, law)
+
+    monkeypatch.setattr(growth, "exchanged_in_place", watched)
+    wrong = Candidate((("a", ""), ("scale", "left"), ("d", "")))
+    found = fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3, 0.3)))
+    _refine(search, score(problem, found), Thresholds())
+    assert asked == ["a", "scale", "a", "d"]
+    assert {law[0] for law in search.structures[-1].candidate.laws} == {"a", "gauge", "d"}
 
 
 def test_where_no_law_explains_anything_each_family_is_tried_by_its_shape() -> None:
