@@ -7,7 +7,7 @@ from typing import Final
 
 from pneumo_ros.diagnosis.fit.problem import Part
 from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, probed_one, short_fits, varied
+from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.parts import reduced, rival, with_all_shapes, with_own_shape
 from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, compatible_parts, trials
 from pneumo_ros.diagnosis.search.selection import likeliest, score
@@ -59,7 +59,8 @@ def _best_exchange(search: Search, found: Fit) -> Fit | None:
         others = [part for part in compatible_parts(problem, bare.candidate.laws) if part != law and part not in beside]
         tried = [*simulated, *trials(problem, bare, others)]
         screened = varied(candidate_scores(problem, bare, tried), EXCHANGED, 2)
-        return problem.each(lambda one: (*probed_one(problem, bare, with_own_shape(problem, one)), bare), screened)
+        probes = ranked(problem, bare, [with_own_shape(problem, one) for one in screened])
+        return [(cost, entry, bare) for cost, entry in probes[:1]]
 
     probes = [one for some in problem.each(instead, found.candidate.laws) for one in some]
     if not probes:
