@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.effects.composition import CORRECTIONS, Compiled, Slot
@@ -33,7 +34,7 @@ from pneumo_ros.effects.observed import ideal_channels, rates_of_channels, state
 from pneumo_ros.effects.parameters import Active, Curve, Parameter
 from pneumo_ros.effects.shapes.families import anything_at
 from pneumo_ros.effects.switches import Layout, kernel_of, layout_of, room_for_states, slots_of, switches_of
-from pneumo_ros.laws.filters import sampled_hold
+from pneumo_ros.laws.filters import held_means
 from pneumo_ros.plant.air_spring import AreaSurface, load_surface
 from pneumo_ros.plant.half_car import HalfCar
 from pneumo_ros.plant.integrator import simulate, substeps
@@ -266,10 +267,13 @@ class RigModel:
         """The record with one command raised by its :meth:`amount` over rows ``first`` to ``last`` - 1."""
         return with_push(record, column, slice(first, last), self.amount(record, column))
 
-    def kept_off(self, record: Drive, column: int, interval: float, phase: float) -> Array:
-        """(N,) m2, by how much a command is off when a driver takes it every ``interval`` s and keeps it."""
+    def kept_off(self, record: Drive, column: int, instants: Array, ends: NDArray[np.int64]) -> Array:
+        """(K, P) m2, by how much a command is off, in the mean over rows ``ends[p]`` to ``ends[p + 1]`` - 1, when a
+        driver takes it at ``instants`` (K, 2), every so many seconds from such a share of them on, and keeps it.
+        """
         commands = np.ascontiguousarray(record.commands[:, column])
-        return np.asarray(sampled_hold(commands, record.period, interval, phase)[0] - commands)
+        means = np.add.reduceat(commands, ends[:-1]) / np.diff(ends)
+        return np.asarray(held_means(commands[: ends[-1]], record.period, instants, ends) - means)
 
     def plant(self, nuisance: Array | None = None, active: Sequence[Active] = ()) -> Plant:
         """Parameters of the nominal equations with nuisance values and the active parameter changes."""

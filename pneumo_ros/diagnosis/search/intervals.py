@@ -51,9 +51,9 @@ class HasIntervals(Protocol):
     def pushed(self, record: Record, column: int, first: int, last: int) -> Record:
         """The record with one command raised by that over rows ``first`` to ``last`` - 1."""
 
-    def kept_off(self, record: Record, column: int, interval: float, phase: float) -> Array:
-        """(N,) by how much a command is off when it is taken every ``interval`` s and kept, from ``phase`` times that
-        after the first row on."""
+    def kept_off(self, record: Record, column: int, instants: Array, ends: NDArray[np.int64]) -> Array:
+        """(K, P) by how much a command is off, in the mean over rows ``ends[p]`` to ``ends[p + 1]`` - 1, when it is
+        taken every ``instants[k, 0]`` s and kept, from ``instants[k, 1]`` times that after the first row on."""
 
 
 @runtime_checkable
@@ -95,16 +95,16 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
     found = [Trial((), (), change) for one in pushes for change in one.done]
     if not found:
         return {}
-    gram, with_residual, _ = projected(problem, base, found, held=False)
+    gram, with_residual, _ = projected(problem, base, found)
     column = np.repeat([one.column for one in pushes], [len(one.done) for one in pushes])
 
     own = [np.isin(column, model.columns(site)) for _, site, _ in shapes]
 
     def explained(some: Sequence[tuple[float, float]]) -> Array:
         """(shapes, some)"""
-        weights = np.array([_weights(problem, pushes, *one) for one in some])
-        each = [weights * there for there in own]
-        return np.array([_explained(-w @ with_residual, np.einsum("ij,ij->i", w @ gram, w)) for w in each])
+        weights = _weights(problem, pushes, np.array(some))
+        each = [(weights[:, there], with_residual[there], gram[np.ix_(there, there)]) for there in own]
+        return np.array([_explained(-w @ asked, np.einsum("ij,ij->i", w @ square, w)) for w, asked, square in each])
 
     tried = list(_tried(problem, max(problem.parameters_of[name, site][which[1]].high for name, site, which in shapes)))
     if not tried:
@@ -159,7 +159,7 @@ def _simulated(
     runs = [one for one in changes(problem, base, starts) if one is not None]
     if not runs:
         return None
-    gram, with_residual, _ = projected(problem, base, runs, held=False)
+    gram, with_residual, _ = projected(problem, base, runs)
     explained = _explained(-with_residual, np.diag(gram))
     best = int(np.argmax(explained))
     return runs[best].values if explained[best] > 0.0 else None
@@ -271,12 +271,9 @@ def _moments(record: Record) -> NDArray[np.int64]:
     return np.append(np.arange(0, count, max(1, round(MOMENT / record.period))), count)
 
 
-def _weights(problem: Problem, pushes: Sequence[_Pushes], interval: float, phase: float) -> Array:
-    """(P,) how much of each push an interval makes: the mean over its moment."""
+def _weights(problem: Problem, pushes: Sequence[_Pushes], instants: Array) -> Array:
+    """(K, P) how much of each push an interval with its phase makes: the mean over its moment."""
     model = problem.model
     assert isinstance(model, HasIntervals)
-    out = []
-    for one in pushes:
-        off = model.kept_off(problem.records[one.log], one.column, interval, phase)
-        out.append(np.add.reduceat(off, one.ends[:-1]) / (np.diff(one.ends) * one.amount))
-    return np.concatenate(out)
+    records = problem.records
+    return np.hstack([model.kept_off(records[p.log], p.column, instants, p.ends) / p.amount for p in pushes])

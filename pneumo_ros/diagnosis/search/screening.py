@@ -146,10 +146,11 @@ def candidate_scores(problem: Problem, base: Fit, found: Sequence[Trial], pairs:
     Judged twice, and merged in turn: once with the unknowns that stand at a bound held there, once with them free,
     because the right effect is what lets them come back from it.
     """
-    held = _candidate_scores(problem, base, found, pairs, held=True)
-    free = _candidate_scores(problem, base, found, pairs, held=False)
+    products, (low, high) = _products(problem, base, found), problem.bounds(base.candidate)
+    free = (base.x > low + 1e-6) & (base.x < high - 1e-6)
+    judged = [_candidate_scores(problem, found, products.projected(one), pairs) for one in _unlike(free)]
     merged: dict[tuple[Part, ...], CandidateScore] = {}
-    for couple in zip_longest(held, free):
+    for couple in zip_longest(*judged):
         for one in couple:
             if one is not None:
                 merged.setdefault(one.parts, one)
@@ -162,7 +163,7 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     The largest over its sites and starts; 0 where no trial moved anything. What is far below one could not have been
     seen.
     """
-    gram, _, _ = projected(problem, base, found, held=False)
+    gram, _, _ = projected(problem, base, found)
     count = float(np.count_nonzero(problem.weight[problem.fitted]))
     out = dict.fromkeys(filter(is_law, problem.model.effects), 0.0)
     for trial, square in zip(found, np.diag(gram), strict=True):
@@ -171,10 +172,16 @@ def visibility(problem: Problem, base: Fit, found: Sequence[Trial]) -> dict[str,
     return out
 
 
+def _unlike(free: Mask) -> list[Mask]:
+    """The unknowns that count as free, those at bounds first held and then free; once where none is at a bound."""
+    whole = np.ones_like(free)
+    return [whole] if free.all() else [free, whole]
+
+
 def _candidate_scores(
-    problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool, held: bool
+    problem: Problem, found: Sequence[Trial], products: tuple[Array, Array, float], pairs: bool
 ) -> list[CandidateScore]:
-    gram, with_residual, total = projected(problem, base, found, held)
+    gram, with_residual, total = products
     signed = np.array([_signed(problem, trial) for trial in found], dtype=bool)
     explained = _explained_by_pairs if pairs else _explained_alone
     share, sizes, members = explained(gram, -with_residual, signed)
@@ -223,38 +230,62 @@ def _scaled(problem: Problem, trial: Trial, factor: float) -> tuple[float, ...]:
     )
 
 
-def projected(problem: Problem, base: Fit, found: Sequence[Trial], held: bool) -> tuple[Array, Array, float]:
-    """Gram matrix of the trials' changes and their products with the residual, both free of what the base can do.
+@dataclass(frozen=True)
+class _Products:
+    """Products of the trials' changes, the residual and the base's sensitivities, on the fitted rows.
+
+    Attributes
+    ----------
+    gram : (T, T) of the changes
+    with_residual : (T,)
+    with_base : (T, m) with the sensitivities, each of these of length one
+    curvature : (m, m) of the sensitivities, with the prior
+    asked : (m,) what the residual and the prior ask of the unknowns; at a converged fit the two cancel
+    total : square of the residual
+    """
+
+    gram: Array
+    with_residual: Array
+    with_base: Array
+    curvature: Array
+    asked: Array
+    total: float
+
+    def projected(self, free: Mask) -> tuple[Array, Array, float]:
+        """:func:`projected` with those unknowns (m,) that are free."""
+        others = self.with_base[:, free]
+        answers = np.linalg.solve(self.curvature[np.ix_(free, free)], np.column_stack([others.T, self.asked[free]]))
+        return self.gram - others @ answers[:, :-1], self.with_residual - others @ answers[:, -1], self.total
+
+
+def projected(problem: Problem, base: Fit, found: Sequence[Trial]) -> tuple[Array, Array, float]:
+    """Gram matrix of the trials' changes and their products with the residual, both free of what the base can do, and
+    the square of the residual.
 
     What a base strains for is counted with what it leaves: a load that masses and areas answer for, far from their
     nominal values, leaves little to explain, and lets them come back.
     """
+    return _products(problem, base, found).projected(np.ones(len(base.x), dtype=bool))
+
+
+def _products(problem: Problem, base: Fit, found: Sequence[Trial]) -> _Products:
     assert base.jacobian is not None
-    rows = problem.fitted
+    rows, count = problem.fitted, len(base.x)
     r = base.residual[rows]
     whole = level(r)
     root = np.sqrt(weights(r) * whole)
     weighted = (r * root).ravel()
     strength = 1.0 / (problem.pace.correlation * whole)
-    low, high = problem.bounds(base.candidate)
-    free = np.ones(len(base.x), dtype=bool)
-    if held:
-        free = (base.x > low + 1e-6) & (base.x < high - 1e-6)  # what stands at its bound cannot answer
-    J = (base.jacobian[rows][:, :, free] * root[:, :, None]).reshape(weighted.size, -1)
-    prior = problem.prior(base.candidate)[free]
     if not found:
-        return np.zeros((0, 0)), np.zeros(0), 1.0
+        return _Products(np.zeros((0, 0)), np.zeros(0), np.zeros((0, count)), np.eye(count), np.zeros(count), 1.0)
     D = np.stack([(t.change[rows] * root).ravel() for t in found])
     # A law and an atom of its shape may be the same column: scaled, with a floor, that is no division by nothing.
+    J = (base.jacobian[rows] * root[:, :, None]).reshape(weighted.size, -1)
     size = np.maximum(np.linalg.norm(J, axis=0), 1e-12)
-    J = J / size
+    J, prior = J / size, problem.prior(base.candidate)
     curvature = J.T @ J + np.diag(prior / (strength * size**2) + SAME_COLUMN)
-    DJ = D @ J
-    asked = J.T @ weighted + prior * base.x[free] / (strength * size)  # at a converged fit the two cancel
-    answers = np.linalg.solve(curvature, np.column_stack([DJ.T, asked]))
-    gram = D @ D.T - DJ @ answers[:, :-1]
-    with_residual = D @ weighted - DJ @ answers[:, -1]
-    return gram, with_residual, float(weighted @ weighted)
+    asked = J.T @ weighted + prior * base.x / (strength * size)
+    return _Products(D @ D.T, D @ weighted, D @ J, curvature, asked, float(weighted @ weighted))
 
 
 def _explained_alone(gram: Array, b: Array, signed: Mask) -> tuple[Array, Array, NDArray[np.intp]]:

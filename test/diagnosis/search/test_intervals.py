@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -135,11 +136,16 @@ def test_what_a_driver_takes_is_the_mean_over_each_row_whatever_the_blocks() -> 
     taken = inside[np.floor(instants / period * fine + 1e-6).astype(int)]
     wanted = np.where(count >= 0, taken, command[0])
     record = driven(np.zeros((len(command), 2)), np.tile(command[:, None], (1, 4)))
-    got = command + MODEL.kept_off(record, 0, INTERVAL, PHASE)
+    rows = np.arange(len(command) + 1)
+    (off,) = MODEL.kept_off(record, 0, np.array([[INTERVAL, PHASE]]), rows)
+    got = command + off
     assert np.allclose(got, wanted.reshape(-1, fine).mean(axis=1), atol=1.1e-6 / fine)
     assert SHAPE.inputs is not None
     whole = SHAPE.inputs(Inputs(record.commands, record.road), period, Ends(True, False), DRIVER, None)[0].commands
-    assert np.array_equal(whole[:, 0], got) and np.array_equal(whole[:, 1], command)
+    assert np.allclose(whole[:, 0], got, rtol=1e-9) and np.array_equal(whole[:, 1], command)
+    moments = np.array([0, 20, 45, 1500])
+    (means,) = MODEL.kept_off(record, 0, np.array([[INTERVAL, PHASE]]), moments)
+    assert np.allclose(means, [off[a:b].mean() for a, b in pairwise(moments)], atol=1e-15)
     memory, blocks = None, []
     for rows in (slice(0, 33), slice(33, 34), slice(34, 1500)):
         given = Inputs(record.commands[rows], record.road[rows])
