@@ -185,6 +185,11 @@ class Problem:
         return self.block % SELECT_EVERY != self.fold
 
     @cached_property
+    def samples(self) -> float:
+        """Effective number of fitted samples: what the training cost grows with."""
+        return float(np.count_nonzero(self.fitted) * self.weight.shape[1] / self.pace.correlation)
+
+    @cached_property
     def rows_of(self) -> tuple[slice, ...]:
         """The fit samples of each log."""
         ends = np.cumsum([0, *(len(r.measured) // self.averaged for r in self.records)]).tolist()

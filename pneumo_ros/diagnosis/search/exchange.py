@@ -5,29 +5,55 @@ from __future__ import annotations
 
 from typing import Final
 
-from pneumo_ros.diagnosis.fit.problem import Part
-from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
-from pneumo_ros.diagnosis.search.parts import reduced, rival, with_all_shapes, with_own_shape
+import numpy as np
+
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
+from pneumo_ros.diagnosis.search.fitting import (
+    of_law,
+    probed,
+    probed_one,
+    restricted,
+    restricted_sensitivities,
+    short_fits,
+    varied,
+)
+from pneumo_ros.diagnosis.search.parts import rival, with_all_shapes, with_own_shape
 from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, compatible_parts, trials
 from pneumo_ros.diagnosis.search.selection import likeliest, score
 from pneumo_ros.diagnosis.search.state import Search
 from pneumo_ros.effects.parameters import family_of
 
-EXCHANGED: Final = 4  # exchanges probed for each effect [numerics]
+FEW: Final = 3  # iterations of a structure without one of its effects [numerics]
+FOR_EACH: Final = 4  # exchanges screened for each effect that may be probed [numerics]
+PROBED: Final = 8  # exchanges probed, of all effects together [numerics]
+TINY: Final = 1e-6  # of the misfit: what a share leaves at least [numerics]
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 
 
 def without(search: Search, found: Fit, law: Part) -> Fit:
     """The structure without one of its effects, after few steps; kept for whoever asks next, until another is asked
-    for.
+    for. The steps begin with the structure's own sensitivities: most are to tolerances and hardly change.
     """
-    of, bare = search.bare
+    problem, (of, bare) = search.problem, search.bare
     if of is not found:
         search.bare = of, bare = found, {}
     if law not in bare:
-        bare[law] = reduced(search.problem, found, of_law(found.candidate, law), 2)
+        whole, gone = fresh(search, found), of_law(found.candidate, law)
+        candidate = Candidate(tuple(part for part in found.candidate.parts if part not in gone))
+        start = restricted(problem, found, candidate)
+        columns = restricted_sensitivities(problem, whole, candidate)
+        bare[law] = fit(problem, candidate, start, columns, iterations=FEW, shared=len(start))
     return bare[law]
+
+
+def fresh(search: Search, found: Fit) -> Fit:
+    """The structure with its sensitivities taken anew; kept until another is asked for."""
+    of, known = search.fresh
+    if of is not found or known is None:
+        known = refreshed(search.problem, found)
+        search.fresh = found, known
+    return known
 
 
 def one_exchanged(search: Search, found: Fit) -> Fit | None:
@@ -44,25 +70,34 @@ def one_exchanged(search: Search, found: Fit) -> Fit | None:
 def _best_exchange(search: Search, found: Fit) -> Fit | None:
     """The structure with one of its effects exchanged for another, or for another site; None where nothing may.
 
-    What is left without each effect is screened for what may take its place, the likeliest are probed, and the best of
-    all is fitted: the effect that a structure misses least need not be the wrong one. What may act beside all of them
-    is simulated once, beside all of them: what it changes hardly depends on one.
+    What is left without each effect is screened for what may take its place, what promises most of all is probed, and
+    the best of that is fitted: the effect that a structure misses least need not be the wrong one. What may act beside
+    all of them is simulated once, beside all of them: what it changes hardly depends on one.
     """
     problem = search.problem
+    fresh(search, found)  # before several ask for it at a time
     beside = compatible_parts(problem, found.candidate.laws)
     simulated = trials(problem, found, beside)
 
-    def instead(law: Part) -> list[tuple[float, CandidateScore, Fit]]:
+    def instead(law: Part) -> list[tuple[CandidateScore, Fit]]:
         bare = without(search, found, law)
         if bare.diverged:
             return []
         others = [part for part in compatible_parts(problem, bare.candidate.laws) if part != law and part not in beside]
         tried = [*simulated, *trials(problem, bare, others)]
-        screened = varied(candidate_scores(problem, bare, tried), EXCHANGED, 2)
-        probes = ranked(problem, bare, [with_own_shape(problem, one) for one in screened])
-        return [(cost, entry, bare) for cost, entry in probes[:1]]
+        screened = varied(candidate_scores(problem, bare, tried), FOR_EACH, 2)
+        return [(one, bare) for one in screened]
 
-    probes = [one for some in problem.each(instead, found.candidate.laws) for one in some]
+    def promised(one: CandidateScore, bare: Fit) -> float:
+        """Training cost where the screening's share of the misfit is explained."""
+        return bare.cost + problem.samples * float(np.log(max(1.0 - one.share, TINY)))
+
+    def probe(entry: CandidateScore, bare: Fit) -> tuple[float, CandidateScore, Fit]:
+        return (*probed_one(problem, bare, with_own_shape(problem, entry)), bare)
+
+    each = [one for some in problem.each(instead, found.candidate.laws) for one in some]
+    likely = sorted(each, key=lambda one: promised(*one))[:PROBED]
+    probes = problem.each(lambda one: probe(*one), likely)
     if not probes:
         return None
     _, entry, bare = min(probes, key=lambda item: item[0])

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
@@ -126,9 +127,20 @@ def of_law(candidate: Candidate, law: Part) -> tuple[Part, ...]:
 
 def restricted(problem: Problem, one: Fit, candidate: Candidate) -> Array:
     """The unknowns of a structure that another, smaller one has as well."""
+    return np.asarray(one.x[_common(problem, one, candidate)])
+
+
+def restricted_sensitivities(problem: Problem, one: Fit, candidate: Candidate) -> Array:
+    """Sensitivities (n, C, m) of a structure to the unknowns that another, smaller one has as well."""
+    assert one.jacobian is not None
+    return np.asarray(one.jacobian[:, :, _common(problem, one, candidate)])
+
+
+def _common(problem: Problem, one: Fit, candidate: Candidate) -> NDArray[np.intp]:
+    """Where the unknowns of a smaller structure stand in one's."""
     own, first = {}, problem.fixed
     for part in one.candidate.parts:
         count = len(problem.effect_parameters(Candidate((part,))))
-        own[part] = one.x[first : first + count]
+        own[part] = np.arange(first, first + count)
         first += count
-    return np.concatenate([one.x[: problem.fixed], *(own[part] for part in candidate.parts)])
+    return np.concatenate([np.arange(problem.fixed), *(own[part] for part in candidate.parts)]).astype(np.intp)

@@ -16,7 +16,7 @@ import numpy as np
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.competition import room_for_more
-from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged, without
+from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, fresh, one_exchanged, without
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
@@ -38,7 +38,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
-COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
+COUNTS: Final = (8, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
 # Of the best one's gain: what another one must gain by its probe to be fitted shortly, by that to be fitted to the end
 # [numerics]
 GAINS: Final = (0.5, 0.8)
@@ -202,6 +202,7 @@ def _one_less(search: Search, found: Fit) -> Fit | None:
 
     None where every smaller structure diverges."""
     problem = search.problem
+    fresh(search, found)  # before several ask for it at a time
     fewer = problem.each(lambda law: without(search, found, law), found.candidate.laws[:-1])
     best = min(fewer, key=lambda one: one.cost)
     return None if best.diverged else reduced(problem, best, (), STEPS)
@@ -232,7 +233,7 @@ def _selected(search: Search, limits: Thresholds) -> Scored:
 def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
     """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end at most."""
     problem, effort = search.problem, search.effort
-    leader = refreshed(problem, base)
+    leader = fresh(search, base)
     others = compatible_parts(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
     probes = ranked(problem, leader, [with_own_shape(problem, one) for one in screened])[: counts[1]]

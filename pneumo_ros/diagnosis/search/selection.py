@@ -160,12 +160,11 @@ def score(problem: Problem, fit: Fit) -> Scored:
     left = np.array(blocks) if blocks else np.mean(squares, axis=0)[None]
     count = len(problem.model.parameters)
     stretch = float(np.sum(fit.x[:count] ** 2))
-    samples = np.count_nonzero(problem.fitted) * problem.weight.shape[1] / problem.pace.correlation
     fitted = level(fit.residual[problem.fitted])
     strain = float((problem.prior(fit.candidate) * fit.x)[count:] @ fit.x[count:])
     unknowns = needed_unknowns(problem, fit, PARAMETER_PENALTY)
     return Scored(
-        fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, float(samples), fitted, strain, unknowns
+        fit, float(_joined(left.mean(axis=0))), _joined(left), stretch, problem.samples, fitted, strain, unknowns
     )
 
 

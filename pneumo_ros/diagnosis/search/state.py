@@ -57,6 +57,7 @@ class Search:
     lost : labels of candidates whose fit diverged
     visible : effect id -> rms in sigmas that its typical size would move the outputs by
     bare : the structure that was last asked for without one of its effects, and what it comes to then, by effect
+    fresh : the structure that was last asked for with its sensitivities taken anew, and that
     exchange : the structure of which an effect was last exchanged, and the best that it comes to
     """
 
@@ -72,6 +73,7 @@ class Search:
     lost: list[str] = field(default_factory=list)
     visible: dict[str, float] = field(default_factory=dict)
     bare: tuple[Fit | None, dict[Part, Fit]] = field(default_factory=lambda: (None, {}))
+    fresh: tuple[Fit | None, Fit | None] = (None, None)
     exchange: tuple[Fit | None, Fit | None] = (None, None)
 
     @property

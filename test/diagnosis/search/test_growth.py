@@ -14,11 +14,12 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, secant
 from pneumo_ros.diagnosis.model import PlainEffect
-from pneumo_ros.diagnosis.search import growth
+from pneumo_ros.diagnosis.search import exchange, growth
 from pneumo_ros.diagnosis.search.competition import compete
-from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged
+from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, one_exchanged, without
+from pneumo_ros.diagnosis.search.fitting import probed_one
 from pneumo_ros.diagnosis.search.growth import MISFIT, _one_more, _polished, _refine, grow
-from pneumo_ros.diagnosis.search.parts import rival
+from pneumo_ros.diagnosis.search.parts import reduced, rival
 from pneumo_ros.diagnosis.search.screening import all_parts, candidate_scores, compatible, trials
 from pneumo_ros.diagnosis.search.selection import Thresholds, likeliest, score, select
 from pneumo_ros.diagnosis.search.state import Effort, Search
@@ -85,6 +86,36 @@ def test_a_signal_that_resembles_four_effects_makes_room_for_them() -> None:
     values = dict(zip((name for name, _ in chosen.fit.candidate.laws),
                       problem.values(chosen.fit.candidate, chosen.fit.x), strict=True))  # fmt: skip
     assert np.allclose([values[name] for name in TRUE], [1.0, 0.6, 1.2, 0.8], atol=0.01)
+
+
+def three_of_four() -> tuple[Search, Fit]:
+    """A search of a log with three effects, and a structure that has a fourth in place of one."""
+    problem = Problem(Sum(), (made({"a": 1.0, "b": 0.6, "c": 1.2}),))
+    search = compete(problem, Effort(), False, lambda share, what: None)
+    wrong = Candidate((("a", ""), ("b", ""), ("d", "")))
+    return search, fit(problem, wrong, problem.start(wrong, None, (0.3, 0.3, 0.3)))
+
+
+def test_a_structure_without_one_effect_begins_with_its_own_sensitivities(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exchange, "FEW", 1)
+    search, found = three_of_four()
+    for law in found.candidate.laws:
+        bare, slow = without(search, found, law), reduced(search.problem, found, (law,))
+        assert bare.candidate == slow.candidate and bare.cost == pytest.approx(slow.cost, abs=1.0)
+        assert bare.simulations == 2  # where it starts, and one step
+        assert without(search, found, law) is bare
+
+
+def test_of_all_exchanges_those_that_promise_most_are_probed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whichever effect they replace: the wrong one has one good exchange, the right ones none."""
+    search, found = three_of_four()
+    tried: list[tuple[Part, ...]] = []
+    monkeypatch.setattr(exchange, "PROBED", 1)
+    monkeypatch.setattr(exchange, "probed_one", lambda problem, base, entry: (
+        tried.append((*base.candidate.parts, *entry.parts)), probed_one(problem, base, entry))[1])  # fmt: skip
+    other = one_exchanged(search, found)
+    assert tried == [(("a", ""), ("b", ""), ("c", ""))]
+    assert other is not None and set(other.candidate.laws) == set(tried[0]) and other.cost < found.cost - 100.0
 
 
 @dataclass(frozen=True)
