@@ -291,7 +291,9 @@ def normal_equations(problem: Problem, state: Fit, rows: Mask) -> tuple[Array, A
     assert state.jacobian is not None
     r = state.residual[rows]
     root = np.sqrt(weights(r))
-    A = (state.jacobian[rows] * root[:, :, None]).reshape(r.size, len(state.x))
+    A = state.jacobian[rows]  # a copy
+    A *= root[:, :, None]
+    A = A.reshape(r.size, len(state.x))
     prior = problem.prior(state.candidate)
     strength = 1.0 / problem.pace.correlation
     with np.errstate(over="ignore", invalid="ignore"):  # a run that runs away: no step from there is taken

@@ -40,7 +40,7 @@ def budgeted(outcome: Outcome, opinion: Opinion) -> Shares:
     """Shares of the best structure."""
     best, found = outcome.best, outcome.budget
     cov = covariance(outcome.problem, best, absent=True)
-    entries = [_entry(outcome, opinion, found, law, cov) for law in best.candidate.laws]
+    entries = outcome.problem.each(lambda law: _entry(outcome, opinion, found, law, cov), best.candidate.laws)
     ranked = tuple(sorted(entries, key=lambda e: -e.share))
     return Shares(ranked, found.refit, _remainder(outcome, found), found.floor)
 
