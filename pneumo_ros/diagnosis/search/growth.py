@@ -38,7 +38,7 @@ from pneumo_ros.effects.parameters import Active, family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
 SHAPED: Final = 2  # leading pairs that are fitted with their shapes [numerics]
-COUNTS: Final = (8, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
+COUNTS: Final = (10, 4, 2)  # further effects probed, fitted shortly, fitted to the end [numerics]
 # Of the best one's gain: what another one must gain by its probe to be fitted shortly, by that to be fitted to the end
 # [numerics]
 GAINS: Final = (0.5, 0.8)
