@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from pneumo_ros.arrays import Array
-from pneumo_ros.effects.parameters import Derived, EffectParameter
+from pneumo_ros.effects.parameters import Active, Derived, EffectParameter
 
 if TYPE_CHECKING:
     from pneumo_ros.diagnosis.fit.pace import Pace
@@ -111,6 +111,9 @@ class HasLimits(Protocol):
 @runtime_checkable
 class HasCoarse(Protocol):
     """A model that makes records of half the rate, for sensitivities."""
+
+    def coarse_serves(self, active: Sequence[Active]) -> bool:
+        """Whether half the rate will do for the sensitivities of these effects."""
 
     def coarse(self, record: Record) -> Record:
         """The record with every other row, so of twice the period."""

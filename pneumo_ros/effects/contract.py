@@ -89,6 +89,7 @@ class Effect:
     screened : of a shape, which of its parameters are tried alone as well: its family's law does nothing like them
     taken : of a shape that may take its command at intervals, which of its parameters are the share that is taken so,
         the interval and the phase
+    sticks : of a shape that may stick, which of its parameters are the share that does and the band
     begins : of a shape, values of its parameters from which it is fitted as well, its family's laws at nothing: there
         it does all of their work, and small steps from these do not lead to it
     elsewhere : places, ``{end}`` as above, where the same motion may come from: its name is held against what may act
@@ -114,6 +115,7 @@ class Effect:
     columns: tuple[int, ...] = ()
     screened: tuple[int, ...] = ()
     taken: tuple[int, ...] = ()
+    sticks: tuple[int, int] | tuple[()] = ()
     begins: tuple[Values, ...] = ()
     elsewhere: tuple[str, ...] = ()
     always: bool = False

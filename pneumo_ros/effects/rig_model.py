@@ -241,6 +241,11 @@ class RigModel:
         """Every other row, commands averaged in pairs: half the steps, true to 1 % of a sensitivity."""
         return coarsened(record)
 
+    def coarse_serves(self, active: Sequence[Active]) -> bool:
+        """Whether that is so with some effects: what sticks jumps to other commands at half the rate."""
+        shapes = ((self.library[one.effect].sticks, one.values) for one in active)
+        return not any(values[where[0]] > 0.0 for where, values in shapes if where)
+
     def changes(self, record: Drive) -> dict[str, float]:
         """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
         pairs = {name: (getattr(record.rig, q).value, getattr(self.rig, q).value) for name, q in NUISANCE.items()}

@@ -298,6 +298,11 @@ class Problem:
         assert isinstance(self.model, HasCoarse)
         return self._from_coarse(k, self.model.coarse(record), candidate, x)
 
+    def coarse_serves(self, candidate: Candidate, x: Array) -> bool:
+        """Whether the coarse logs are good enough for the sensitivities there."""
+        model = self.model
+        return isinstance(model, HasCoarse) and model.coarse_serves(self.active(candidate, self.values(candidate, x)))
+
     def _from_coarse(self, k: int, record: Record, candidate: Candidate, x: Array) -> Array:
         nuisance, active, whole = self.nuisance(x), self.active(candidate, self.values(candidate, x)), self.records[k]
         initial, std = self.model.initial(whole, active)

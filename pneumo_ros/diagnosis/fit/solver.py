@@ -213,13 +213,14 @@ def _jacobian(problem: Problem, state: Fit, borrowed: Array | None, stale: Array
         still = (wanted >= problem.fixed) & ((state.x[wanted] <= low[wanted]) | (state.x[wanted] >= high[wanted]))
         columns[:, :, wanted[still]] = stale[:, :, wanted[still]]
         wanted = wanted[~still]
-    here = problem.predict_coarse(state.candidate, state.x)
+    predict = problem.predict_coarse if problem.coarse_serves(state.candidate, state.x) else problem.predict
+    here = predict(state.candidate, state.x)
 
     def changes(together: list[int]) -> Array:
         step = STEP if state.x[together[0]] + STEP <= high[together[0]] else -STEP
         moved = state.x.copy()
         moved[together] += step
-        change = (here - problem.predict_coarse(state.candidate, moved)) * (problem.weight / step)
+        change = (here - predict(state.candidate, moved)) * (problem.weight / step)
         return np.where(np.isfinite(change), change, 0.0)
 
     groups = _together(problem, wanted.tolist())

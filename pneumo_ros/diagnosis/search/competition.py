@@ -21,6 +21,7 @@ from pneumo_ros.diagnosis.fit.command_events import timed
 from pneumo_ros.diagnosis.fit.problem import SELECT_EVERY, Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.shooting import carried, free_run_failed, windowed
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
+from pneumo_ros.diagnosis.search.bands import with_bands
 from pneumo_ros.diagnosis.search.fitting import (
     by_cost,
     finished,
@@ -36,9 +37,9 @@ from pneumo_ros.diagnosis.search.parts import rival, shaped
 from pneumo_ros.diagnosis.search.screening import (
     CandidateScore,
     all_parts,
-    as_scanned,
     candidate_scores,
     compatible,
+    scanned_laws,
     trials,
     visibility,
 )
@@ -102,9 +103,8 @@ def _scan_intervals(search: Search) -> None:
     found = intervals(search.problem, base)
     if not found:
         return
-    search.problem = replace(search.problem, scanned=found)
-    search.logged = replace(search.logged, scanned=found)
-    own = [one for one in (as_scanned(search.problem, law) for law in all_parts(search.problem)) if one is not None]
+    search.start_from(found)
+    own = scanned_laws(search.problem, all_parts(search.problem), found)
     short = short_fits(search, base, own, (0.58, 0.6))
     ended = search.problem.each(lambda one: finished(search.problem, one, search.effort), short)
     search.structures += [sharpened(search.problem, one, search.effort.long) for one in ended]
@@ -189,6 +189,8 @@ def _run_singles(search: Search) -> None:
     effort, problem = search.effort, search.problem
     search.progress(0.05, "screening effects")
     search.refit = refreshed(problem, search.refit)
+    search.start_from(with_bands(problem, search.refit).scanned)
+    problem = search.problem
     found = trials(problem, search.refit, all_parts(problem))
     search.screened = candidate_scores(problem, search.refit, found)
     search.visible = visibility(problem, search.refit, found)

@@ -8,19 +8,25 @@ close: the misfit of a law must not pass for a second effect.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
+from pneumo_ros.diagnosis.search.bands import sharpened_bands, with_bands
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, fresh, one_exchanged, without
 from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
-from pneumo_ros.diagnosis.search.screening import CandidateScore, as_scanned, candidate_scores, compatible_parts, trials
+from pneumo_ros.diagnosis.search.screening import (
+    CandidateScore,
+    candidate_scores,
+    compatible_parts,
+    scanned_laws,
+    trials,
+)
 from pneumo_ros.diagnosis.search.selection import (
     SAME,
     THIRD,
@@ -84,6 +90,7 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
         _end(search, _selected(search, limits))
     best = _selected(search, limits)
     sharper = sharpened(search.problem, best.fit, search.effort.long)
+    sharper = sharpened_bands(search.problem, sharper, search.effort.long)
     if sharper is not best.fit:
         search.structures.append(sharper)
         best = _selected(search, limits)
@@ -155,12 +162,13 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
 
 
 def _begun_anew(search: Search, found: Fit) -> Fit:
-    """The structure with the shapes of its earlier effects begun alone once more: what they did beside fewer effects is
-    where small steps keep them, and no more what they do best.
+    """The structure with the shapes of its earlier effects begun alone once more, and with the bands of what sticks
+    looked for anew: what they did beside fewer effects is where small steps keep them, and no more what they do best.
     """
     best = found
     for law in found.candidate.laws[:-1]:
         best = begun(search.problem, best, law, search.effort.long)
+    best = sharpened_bands(search.problem, best, search.effort.short)
     if best is not found:
         search.structures.append(best)
     return best
@@ -182,11 +190,11 @@ def _rescanned(search: Search, found: Fit) -> bool:
     scanned = {} if bare.diverged else intervals(problem, bare)
     if not scanned:
         return False
-    search.problem = problem = replace(problem, scanned=scanned)
+    search.start_from(scanned)
+    problem = search.problem
     search.exchange = None, None  # there is more to exchange for now
-    search.logged = replace(search.logged, scanned=scanned)
-    starts = [as_scanned(problem, law) for law in compatible_parts(problem, bare.candidate.laws)]
-    short = short_fits(search, bare, [one for one in starts if one is not None], (0.89, 0.89))
+    starts = scanned_laws(problem, compatible_parts(problem, bare.candidate.laws), scanned)
+    short = short_fits(search, bare, starts, (0.89, 0.89))
     if short:
         search.structures.append(sharpened(problem, short[0], search.effort.long))
     return True
@@ -232,8 +240,9 @@ def _selected(search: Search, limits: Thresholds) -> Scored:
 
 def _one_more(search: Search, base: Fit, counts: tuple[int, int, int] = COUNTS) -> list[Fit]:
     """The best structures with one more effect; ``counts`` are probed, fitted shortly, fitted to the end at most."""
-    problem, effort = search.problem, search.effort
-    leader = fresh(search, base)
+    leader, effort = fresh(search, base), search.effort
+    search.start_from(with_bands(search.problem, leader).scanned)
+    problem = search.problem
     others = compatible_parts(problem, base.candidate.laws)
     screened = varied(candidate_scores(problem, leader, trials(problem, leader, others)), counts[0], 2)
     probes = ranked(problem, leader, [with_own_shape(problem, one) for one in screened])[: counts[1]]

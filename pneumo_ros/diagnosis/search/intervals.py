@@ -112,9 +112,9 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
     heights = np.hstack(problem.each(explained, [tried[k : k + TOGETHER] for k in range(0, len(tried), TOGETHER)]))
     out: dict[Part, tuple[float, ...]] = {}
     for (name, site, which), height in zip(shapes, heights, strict=True):
-        best = _simulated(problem, base, (name, site), which, [tried[k] for k in _peaks(height)])
-        if best is not None:
-            out[name, site] = best
+        best = simulated(problem, base, (name, site), which, [tried[k] for k in _peaks(height)])
+        if best:
+            out[name, site] = best[0][1]
     return out
 
 
@@ -125,8 +125,8 @@ def shapes_that_take(model: Model) -> list[tuple[str, str, tuple[int, ...]]]:
 
 
 def _explained(asked: Array, square: Array) -> Array:
-    """What a part that does all it does at intervals explains: a driver either keeps a command or does not, so no
-    multiple of it may fit the residual better.
+    """What a part that does all it does in one way explains: a driver either keeps a command or does not, a spool
+    either sticks or does not, so no multiple of it may fit the residual better.
     """
     return 2.0 * asked - square
 
@@ -144,25 +144,37 @@ def _peaks(explained: Array) -> list[int]:
     return out
 
 
-def _simulated(
-    problem: Problem, base: Fit, shape: Part, which: Sequence[int], tried: Sequence[tuple[float, float]]
-) -> tuple[float, ...] | None:
-    """Values of the shape at the one of some intervals and phases that explains most, each simulated; None where none
-    explains anything.
+def simulated(
+    problem: Problem,
+    base: Fit,
+    shape: Part,
+    which: Sequence[int],
+    tried: Sequence[Sequence[float]],
+    coarsely: bool = True,
+) -> list[tuple[float, tuple[float, ...]]]:
+    """Values of a shape that does all it does in one way, by numbers of that way, each simulated; those that explain
+    anything, with the share of the misfit that each explains, the largest first.
+
+    Parameters
+    ----------
+    which : of its parameters, the share that is done so and its numbers, an interval and a phase for example
+    tried : values of these numbers
+    coarsely : at half the log's rate where the model knows how
     """
-    share, interval, phase = which
+    share, *numbers = which
     starts = []
     for found in tried:
         values = [0.0 if p.size else p.typical for p in problem.parameters_of[shape]]
-        values[share], (values[interval], values[phase]) = 1.0, found
+        values[share] = 1.0
+        for place, value in zip(numbers, found, strict=True):
+            values[place] = value
         starts.append(((shape,), tuple(values)))
-    runs = [one for one in changes(problem, base, starts) if one is not None]
+    runs = [one for one in changes(problem, base, starts, coarsely) if one is not None]
     if not runs:
-        return None
-    gram, with_residual, _ = projected(problem, base, runs)
-    explained = _explained(-with_residual, np.diag(gram))
-    best = int(np.argmax(explained))
-    return runs[best].values if explained[best] > 0.0 else None
+        return []
+    gram, with_residual, total = projected(problem, base, runs)
+    explained = _explained(-with_residual, np.diag(gram)) / total
+    return [(float(explained[k]), runs[k].values) for k in np.argsort(-explained) if explained[k] > 0.0]
 
 
 def taken_at(problem: Problem, found: Fit) -> list[tuple[Part, list[int]]]:

@@ -52,7 +52,7 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
     for part in parts:
         values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
     alone = [(part, own) for part in parts for own in _begins(problem, part)]
-    starts = [values, *(_alone(problem, one, part, own, parts, values) for part, own in alone)]
+    starts = [values, *(shape_alone(problem, one, part, own, parts, values) for part, own in alone)]
 
     def fitted(values: Sequence[float]) -> Fit:
         start = problem.start(candidate, one.x[: problem.fixed], values)
@@ -68,7 +68,7 @@ def begun(problem: Problem, one: Fit, law: Part, iterations: int) -> Fit:
     """
     shapes = [part for part in of_law(one.candidate, law) if part != law]
     values = problem.values(one.candidate, one.x).tolist()
-    starts = [_alone(problem, one, part, own, (), values) for part in shapes for own in _begins(problem, part)]
+    starts = [shape_alone(problem, one, part, own, (), values) for part in shapes for own in _begins(problem, part)]
     own = (one.candidate.parts.index(part) for part in (law, *shapes))
     before = Candidate(one.candidate.parts[: min(own)])
     shared = problem.fixed + len(problem.effect_parameters(before))  # columns that do not begin elsewhere
@@ -120,8 +120,8 @@ def _begins(problem: Problem, part: Part) -> list[tuple[float, ...]]:
     return [*own, *([] if scanned is None else [tuple(scanned)])]
 
 
-def _alone(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts: Sequence[Part],
-           values: Sequence[float]) -> list[float]:  # fmt: skip
+def shape_alone(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts: Sequence[Part],
+          values: Sequence[float]) -> list[float]:  # fmt: skip
     """Start values of a structure with further parts, one of which is a shape that does what its family's laws did;
     these start at nothing.
     """

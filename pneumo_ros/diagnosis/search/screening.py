@@ -9,7 +9,7 @@ Gram matrix of the projected trajectories holds them, so that two effects that o
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Final
@@ -91,21 +91,23 @@ def trials(problem: Problem, base: Fit, parts: Iterable[Part]) -> list[Trial]:
 
 
 def changes(
-    problem: Problem, base: Fit, starts: Iterable[tuple[tuple[Part, ...], tuple[float, ...]]]
+    problem: Problem, base: Fit, starts: Iterable[tuple[tuple[Part, ...], tuple[float, ...]]], coarsely: bool = True
 ) -> list[Trial | None]:
-    """Parts with start values simulated on top of a fit, coarsely where that will do; None for what diverges or moves
-    nothing.
+    """Parts with start values simulated on top of a fit, ``coarsely`` where that will do; None for what diverges or
+    moves nothing.
     """
     own = list(problem.values(base.candidate, base.x))
-    here = problem.predict_coarse(base.candidate, base.x)
+    coarsely = coarsely and problem.coarse_serves(base.candidate, base.x)
+    predict = problem.predict_coarse if coarsely else problem.predict
+    here = predict(base.candidate, base.x)
 
     def tried(what: tuple[tuple[Part, ...], tuple[float, ...]]) -> Trial | None:
         added, values = what
         candidate = Candidate((*base.candidate.parts, *added))
         x = problem.start(candidate, base.x[: problem.fixed], [*own, *values])
         with np.errstate(over="ignore", invalid="ignore"):
-            change = (here - problem.predict_coarse(candidate, x)) * problem.weight
-        if not np.all(np.isfinite(change)):  # what is too stiff for coarse steps
+            change = (here - predict(candidate, x)) * problem.weight
+        if not np.all(np.isfinite(change)) and coarsely:  # what is too stiff for coarse steps
             change = problem.residual(candidate, x) - base.residual
         seen = np.all(np.isfinite(change)) and np.max(np.abs(change)) > 1e-6
         return Trial(added, values, change) if seen else None
@@ -119,7 +121,8 @@ def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[
     out: list[tuple[tuple[Part, ...], tuple[float, ...]]] = [((part,), values) for values in start_values(own)]
     shape = (f"{family_of(part[0])}.{SHAPE}", part[1])
     effect = problem.model.effects.get(shape[0])
-    if isinstance(effect, IsScreened) and is_law(part[0]):
+    scanned = as_scanned(problem, part)
+    if isinstance(effect, IsScreened) and is_law(part[0]) and scanned is None:
         still, atoms = [0.0 if p.size else p.typical for p in own], problem.parameters_of[shape]
         for k in effect.screened:
             alone = [p.typical if m == k or not p.size else 0.0 for m, p in enumerate(atoms)]
@@ -127,17 +130,22 @@ def _starts(problem: Problem, part: Part) -> list[tuple[tuple[Part, ...], tuple[
             for m, p in enumerate(atoms):
                 if not p.size:
                     out += [((part, shape), (*still, *alone[:m], value, *alone[m + 1 :])) for value in p.starts]
-    scanned = as_scanned(problem, part)
     return out if scanned is None else [*out, (scanned.parts, scanned.values)]
 
 
 def as_scanned(problem: Problem, law: Part) -> CandidateScore | None:
     """A law at nothing with its family's shape as the logs were scanned for it; None where they were not."""
     shape = (f"{family_of(law[0])}.{SHAPE}", law[1])
-    if shape not in problem.scanned:
+    if shape not in problem.scanned or not is_law(law[0]):
         return None
     still = (0.0 if p.size else p.typical for p in problem.parameters_of[law])
     return CandidateScore((law, shape), (*still, *problem.scanned[shape]), 0.0)
+
+
+def scanned_laws(problem: Problem, laws: Iterable[Part], scanned: Container[Part]) -> list[CandidateScore]:
+    """:func:`as_scanned` of those laws whose shape is one of some that were scanned for."""
+    found = [as_scanned(problem, law) for law in laws]
+    return [one for one in found if one is not None and one.parts[1] in scanned]
 
 
 def candidate_scores(problem: Problem, base: Fit, found: Sequence[Trial], pairs: bool = False) -> list[CandidateScore]:

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
@@ -75,6 +75,12 @@ class Search:
     bare: tuple[Fit | None, dict[Part, Fit]] = field(default_factory=lambda: (None, {}))
     fresh: tuple[Fit | None, Fit | None] = (None, None)
     exchange: tuple[Fit | None, Fit | None] = (None, None)
+
+    def start_from(self, found: Mapping[Part, tuple[float, ...]]) -> None:
+        """Start whoever comes from now on from what the logs were scanned for, too."""
+        found = {**self.problem.scanned, **found}
+        if found != self.problem.scanned:
+            self.problem, self.logged = replace(self.problem, scanned=found), replace(self.logged, scanned=found)
 
     @property
     def finalists(self) -> list[Fit]:

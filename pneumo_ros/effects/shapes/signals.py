@@ -134,10 +134,11 @@ def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filt
 
     parameters = (*_shares(names, name.startswith("anything")), *fitted)
     screened = (len(names),) if alone else ()
+    sticks = (len(names), len(names) + 1) if made is _stick else ()
     at = (len(names), len(names) + 1, len(names) + 2) if taken else ()
     begins = _begun(parameters) if made is _follow else ()
     return Effect(name, summary, ENDS, ("{end}_air",), parameters, inputs=inputs, screened=screened, taken=at,
-                  begins=begins)  # fmt: skip
+                  sticks=sticks, begins=begins)  # fmt: skip
 
 
 def _exciter(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -251,7 +252,7 @@ ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c i
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 STICKING = (*_shares(["sticking"]),
-            EffectParameter("band", "m2", 1e-8, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
+            EffectParameter("band", "m2", 3e-9, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
 TAKING = (*_shares(["taken"]), EffectParameter("interval", "s", 4e-3, 0.25, 0.05, spread=10.0),
           EffectParameter("phase", "1", 0.0, 1.0, 0.5, spread=10.0))  # fmt: skip
 EXCITER = (EffectParameter("gain", "1", -0.5, 0.5, 0.03, size=True, spread=10.0),
