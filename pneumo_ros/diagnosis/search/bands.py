@@ -89,17 +89,15 @@ def _best(
 ) -> tuple[float, ...] | None:
     """Values of a shape that sticks, with the band that explains most; None where none explains anything."""
     found = simulated(problem, base, shape, which, [(band,) for band in bands], coarsely=False)
-    return found[0][1] if found else None
+    return found[0] if found else None
 
 
 def _bands(problem: Problem, shape: Part, band: int) -> list[float]:
     """Bands worth trying, SI, neighbours by :data:`RATIO`: of a few per cent of what the command moves by, and more, up
     to so much that it would hardly ever be followed; none where it stands still.
     """
-    model, (low, high) = (
-        problem.model,
-        (problem.parameters_of[shape][band].low, problem.parameters_of[shape][band].high),
-    )
+    model, parameter = problem.model, problem.parameters_of[shape][band]
+    low, high = parameter.low, parameter.high
     if isinstance(model, HasIntervals):
         amount = max(model.amount(record, column) for record in problem.records for column in model.columns(shape[1]))
         low, high = max(low, SMALLEST * amount), min(high, LARGEST * amount)

@@ -114,7 +114,7 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
     for (name, site, which), height in zip(shapes, heights, strict=True):
         best = simulated(problem, base, (name, site), which, [tried[k] for k in _peaks(height)])
         if best:
-            out[name, site] = best[0][1]
+            out[name, site] = best[0]
     return out
 
 
@@ -151,9 +151,9 @@ def simulated(
     which: Sequence[int],
     tried: Sequence[Sequence[float]],
     coarsely: bool = True,
-) -> list[tuple[float, tuple[float, ...]]]:
+) -> list[tuple[float, ...]]:
     """Values of a shape that does all it does in one way, by numbers of that way, each simulated; those that explain
-    anything, with the share of the misfit that each explains, the largest first.
+    anything, the one first that explains most.
 
     Parameters
     ----------
@@ -172,9 +172,9 @@ def simulated(
     runs = [one for one in changes(problem, base, starts, coarsely) if one is not None]
     if not runs:
         return []
-    gram, with_residual, total = projected(problem, base, runs)
-    explained = _explained(-with_residual, np.diag(gram)) / total
-    return [(float(explained[k]), runs[k].values) for k in np.argsort(-explained) if explained[k] > 0.0]
+    gram, with_residual, _ = projected(problem, base, runs)
+    explained = _explained(-with_residual, np.diag(gram))
+    return [runs[k].values for k in np.argsort(-explained) if explained[k] > 0.0]
 
 
 def taken_at(problem: Problem, found: Fit) -> list[tuple[Part, list[int]]]:

@@ -121,7 +121,7 @@ def _begins(problem: Problem, part: Part) -> list[tuple[float, ...]]:
 
 
 def shape_alone(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts: Sequence[Part],
-          values: Sequence[float]) -> list[float]:  # fmt: skip
+                values: Sequence[float]) -> list[float]:  # fmt: skip
     """Start values of a structure with further parts, one of which is a shape that does what its family's laws did;
     these start at nothing.
     """
