@@ -26,9 +26,8 @@ from pneumo_ros.effects.parameters import family_of
 
 RATIO: Final = 1.03  # of neighbouring bands [numerics]
 FINER: Final = 7  # bands tried between the neighbours of the best one [numerics]
-# Standard deviations of a command that a band is tried from and up to [numerics]
-SMALLEST: Final = 0.04
-LARGEST: Final = 2.5
+SMALLEST: Final = 0.04  # standard deviations of a command that bands are tried from [numerics]
+LARGEST: Final = 2.5  # and up to which [numerics]
 BARE: Final = 3  # iterations of a fit without what sticks, before its band is looked for anew [numerics]
 
 
