@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far must a command move before a part that sticks follows?
 
-Such a part stays, and where it goes to depends on where it stayed before: a band that is off by a tenth is another
-record of jumps, and no gradient leads from the one to the other. So every band within the bounds is simulated, a few
-per cent from the next, beside what a fit holds, and compared with the residual like any candidate
+Such a part stays, and where it goes to depends on where it stayed before: a band that is off by a few per cent is
+another record of jumps, and no gradient leads from the one to the other. So every band within the bounds is simulated,
+a few per cent from the next, beside what a fit holds, and compared with the residual like any candidate
 (:mod:`pneumo_ros.diagnosis.search.screening`), at the log's full rate: at half of it such a part jumps to other
 commands, which move by a tenth of a band from row to row. What is fitted is sharpened the same way.
 """
@@ -22,12 +22,12 @@ from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import of_law
 from pneumo_ros.diagnosis.search.intervals import HasIntervals, simulated
 from pneumo_ros.diagnosis.search.parts import reduced, shape_alone
-from pneumo_ros.effects.parameters import family_of
+from pneumo_ros.diagnosis.search.screening import compatible
 
 RATIO: Final = 1.03  # of neighbouring bands [numerics]
 FINER: Final = 7  # bands tried between the neighbours of the best one [numerics]
 SMALLEST: Final = 0.04  # standard deviations of a command that bands are tried from [numerics]
-LARGEST: Final = 2.5  # and up to which [numerics]
+LARGEST: Final = 2.5  # standard deviations of a command that bands are tried up to [numerics]
 BARE: Final = 3  # iterations of a fit without what sticks, before its band is looked for anew [numerics]
 
 
@@ -46,7 +46,7 @@ def with_bands(problem: Problem, base: Fit) -> Problem:
     """
     found = {}
     for shape, which in _shapes_that_stick(problem.model):
-        if any(_overlap(shape, part) for part in base.candidate.parts):
+        if not all(compatible(problem.model, shape, part) for part in base.candidate.parts):
             continue
         best = _best(problem, base, shape, which, _bands(problem, shape, which[1]))
         if best is not None:
@@ -103,8 +103,3 @@ def _bands(problem: Problem, shape: Part, band: int) -> list[float]:
     if not low < high:
         return []
     return np.geomspace(low, high, 1 + int(np.ceil(np.log(high / low) / np.log(RATIO)))).tolist()
-
-
-def _overlap(one: Part, other: Part) -> bool:
-    """Whether two parts of one family act at a common end."""
-    return family_of(one[0]) == family_of(other[0]) and (one[1] == other[1] or "both" in (one[1], other[1]))

@@ -7,18 +7,16 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Candidate, Part
-from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
+from pneumo_ros.diagnosis.fit.problem import Part
+from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
 from pneumo_ros.diagnosis.search.fitting import (
     of_law,
     probed,
     probed_one,
-    restricted,
-    restricted_sensitivities,
     short_fits,
     varied,
 )
-from pneumo_ros.diagnosis.search.parts import rival, with_all_shapes, with_own_shape
+from pneumo_ros.diagnosis.search.parts import reduced, rival, with_all_shapes, with_own_shape
 from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, compatible_parts, trials
 from pneumo_ros.diagnosis.search.selection import likeliest, score
 from pneumo_ros.diagnosis.search.state import Search
@@ -35,15 +33,12 @@ def without(search: Search, found: Fit, law: Part) -> Fit:
     """The structure without one of its effects, after few steps; kept for whoever asks next, until another is asked
     for. The steps begin with the structure's own sensitivities: most are to tolerances and hardly change.
     """
-    problem, (of, bare) = search.problem, search.bare
+    of, bare = search.bare
     if of is not found:
         search.bare = of, bare = found, {}
     if law not in bare:
-        whole, gone = fresh(search, found), of_law(found.candidate, law)
-        candidate = Candidate(tuple(part for part in found.candidate.parts if part not in gone))
-        start = restricted(problem, found, candidate)
-        columns = restricted_sensitivities(problem, whole, candidate)
-        bare[law] = fit(problem, candidate, start, columns, iterations=FEW, shared=len(start))
+        whole = fresh(search, found)
+        bare[law] = reduced(search.problem, whole, of_law(whole.candidate, law), FEW, borrowed=True)
     return bare[law]
 
 

@@ -13,7 +13,7 @@ from pneumo_ros.arrays import Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
-from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted
+from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted, restricted_sensitivities
 from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, trials
 from pneumo_ros.diagnosis.search.selection import FORM, score
 from pneumo_ros.diagnosis.traits import BeginsAlone
@@ -166,12 +166,21 @@ def beginnings(problem: Problem, part: Part, found: Mapping[str, float]) -> list
 
 
 def reduced(
-    problem: Problem, one: Fit, parts: Sequence[Part], iterations: int = STEPS, rows: Mask | None = None
+    problem: Problem,
+    one: Fit,
+    parts: Sequence[Part],
+    iterations: int = STEPS,
+    rows: Mask | None = None,
+    borrowed: bool = False,
 ) -> Fit:
-    """A structure without some of its parts, fitted from what is left of it."""
+    """A structure without some of its parts, fitted from what is left of it; with ``borrowed`` sensitivities, its own,
+    for the first step.
+    """
     kept = tuple(part for part in one.candidate.parts if part not in parts)
     candidate = Candidate(kept)
-    return fit(problem, candidate, restricted(problem, one, candidate), None, rows=rows, iterations=iterations)
+    start = restricted(problem, one, candidate)
+    columns, shared = (restricted_sensitivities(problem, one, candidate), len(start)) if borrowed else (None, None)
+    return fit(problem, candidate, start, columns, rows=rows, iterations=iterations, shared=shared)
 
 
 def rival(problem: Problem, law: Part, other: Part) -> bool:

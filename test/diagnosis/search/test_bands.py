@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A spool that sticks and jumps: its band is found though no gradient leads to it, whatever else is missing."""
+"""A spool that sticks and jumps: its band is found though no gradient leads to it."""
 
 from __future__ import annotations
 
