@@ -37,7 +37,8 @@ class Mixture:
 
 
 MIXTURES: dict[str, Mixture] = {
-    "full": Mixture(20267, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
+    "full": Mixture(20268, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
+    "full-0.7": Mixture(20267, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
     "full-0.6": Mixture(20266, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
     "full-0.5": Mixture(20265, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),
     "full-0.4": Mixture(20264, none=64, formed=32, single=96, several=60, unknown=30, mixed=30),

@@ -56,7 +56,7 @@ class Planned:
 
 def case_prefix(name: str) -> str:
     """What the names of a set's cases begin with: those of a full set are ``full-001`` and on, in its own folder."""
-    of_releases = {f"full-0.{release}" for release in range(3, 7)}  # those before kept the number in their names
+    of_releases = {f"full-0.{release}" for release in range(3, 8)}  # those before kept the number in their names
     return "full" if name in of_releases else name
 
 

@@ -32,7 +32,7 @@ Only = Annotated[str, typer.Option(help="Only cases whose name contains this.")]
 def make(
     folder: Folder,
     set_name: Annotated[
-        str, typer.Option("--set", help="full (280 cases), full-0.6 to full-0.1, dev, dev2 to dev8, ci.")
+        str, typer.Option("--set", help="full (280 cases), full-0.7 to full-0.1, dev, dev2 to dev8, ci.")
     ] = "dev",
     workers: Workers = 1,
     scheduler: Scheduler = "",

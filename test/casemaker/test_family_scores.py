@@ -171,4 +171,4 @@ def test_full_set_has_the_promised_mix() -> None:
     assert len({c.seed for c in cases}) == len(cases)
     assert plan("full") == cases
     assert json.dumps([c.name for c in plan("dev6")]) != json.dumps([c.name for c in plan("dev7")])
-    assert set(MIXTURES) == {"full", "full-0.6", "full-0.5", "full-0.4", "dev6", "dev7", "dev8"}
+    assert set(MIXTURES) == {"full", "full-0.7", "full-0.6", "full-0.5", "full-0.4", "dev6", "dev7", "dev8"}
