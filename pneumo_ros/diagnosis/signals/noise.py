@@ -24,6 +24,7 @@ ONSET: Final = (0, 1)
 ONSET_ORDER: Final = 4  # order of the difference in which an onset is looked for [numerics]
 # Share of the estimate that a drive must bring it down to: the least of many estimates lies low by itself [taste]
 WORTH: Final = 0.9
+RANK: Final = 1e-8  # of the largest singular value, below which a cause is another one's multiple [numerics]
 
 
 def white_noise(
@@ -107,18 +108,29 @@ def _beside_drive(values: Array, weight: Array, drive: Array, delay: int, order:
     first = max(late)
     causes = np.column_stack([steps[first - k : len(steps) - k] for k in late])
     rest, whole = rest[first:], whole[first:]
-    kept = [
-        _unexplained(rest[start : start + WINDOW], causes[start : start + WINDOW], whole[start : start + WINDOW])
-        for start in range(0, len(rest) - WINDOW + 1, WINDOW)
-    ]
-    pooled = np.concatenate(kept) if kept else np.empty(0)
+    windows, rows = len(rest) // WINDOW, len(rest) // WINDOW * WINDOW
+    if not windows:
+        return float("nan")
+    shape = (windows, WINDOW)
+    pooled = _unexplained(rest[:rows].reshape(shape), causes[:rows].reshape(*shape, -1), whole[:rows].reshape(shape))
     return _spread(pooled, order) if len(pooled) >= MIN_SAMPLES else float("nan")
 
 
 def _unexplained(rest: Array, causes: Array, whole: NDArray[np.bool_]) -> Array:
-    """Residuals of a least-squares fit of the causes in one window, scaled up for the degrees of freedom it used."""
-    rows = int(np.count_nonzero(whole))
-    if rows < max(MIN_SAMPLES, 4 * causes.shape[1]):
+    """Residuals of a least-squares fit of the causes in each window, scaled up for the degrees of freedom it used.
+
+    Parameters
+    ----------
+    rest, causes, whole : (W, n), (W, n, k), (W, n); rows that are not ``whole`` are left out, and windows with too few
+    """
+    rows = np.count_nonzero(whole, axis=1)
+    enough = rows >= max(MIN_SAMPLES, 4 * causes.shape[2])
+    rest, causes, whole, rows = rest[enough], causes[enough], whole[enough], rows[enough]
+    if not len(rest):
         return np.empty(0)
-    gains, _, rank, _ = np.linalg.lstsq(causes[whole], rest[whole], rcond=1e-8)
-    return np.asarray((rest[whole] - causes[whole] @ gains) * np.sqrt(rows / (rows - rank)))
+    # One decomposition for all: a row of nothing takes no part in a fit.
+    left, size, _ = np.linalg.svd(np.where(whole[:, :, None], causes, 0.0), full_matrices=False)
+    acting = size > RANK * size[:, :1]
+    explained = np.einsum("wnk,wk->wn", left, acting * np.einsum("wnk,wn->wk", left, np.where(whole, rest, 0.0)))
+    scale = np.sqrt(rows / (rows - np.count_nonzero(acting, axis=1)))
+    return np.asarray(((rest - explained) * scale[:, None])[whole])
