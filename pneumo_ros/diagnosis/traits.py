@@ -55,6 +55,15 @@ class HasPace(Protocol):
 
 
 @runtime_checkable
+class ChangesNumbers(Protocol):
+    """An effect that may change numbers of the rig itself, and nothing besides."""
+
+    @property
+    def changes_numbers(self) -> bool:
+        """Whether it does: tolerances may then answer for all of it."""
+
+
+@runtime_checkable
 class IsScreened(Protocol):
     """A shape of which some parameters may be tried alone."""
 

@@ -126,6 +126,11 @@ class Effect:
         """Name of the kernel's slot that its term runs in: shapes of one place share one, their amplitudes add up."""
         return self.slot or self.id
 
+    @property
+    def changes_numbers(self) -> bool:
+        """Whether it is a law that changes numbers of the rig, and nothing besides."""
+        return self.plant is not None and self.term is None
+
     def elsewhere_of(self, site: str) -> tuple[tuple[str, ...], ...]:
         """The places elsewhere for what acts at one site, those of both ends together where it acts at both."""
         ends = [end for end in ENDS[:2] if site in (end, "both", "") or f"_{end}" in site or f"{end}_" in site]

@@ -321,20 +321,27 @@ def structures(
 
 
 def _plain(one: Scored, calibration: Calibration) -> float:
-    """Log weight of a structure among those with other numbers of effects."""
+    """Log weight of a structure against the refit."""
     pays = calibration.first_penalty * min(one.size, 1) + calibration.second_penalty * max(one.size - 1, 0)
     return -SHARPNESS * one.price / one.samples - pays
 
 
+def _of_any_size(one: Scored, calibration: Calibration) -> float:
+    """Log weight of a structure among those with other numbers of effects: the tolerances count in full, as in
+    :func:`~pneumo_ros.diagnosis.search.selection.log_weight`, for an effect that is missing strains them.
+    """
+    return _plain(one, calibration) + (SHARPNESS / one.samples - 0.5) * one.stretch
+
+
 def _of_one_size(refit: Scored, some: Sequence[Scored], calibration: Calibration) -> dict[Candidate, float]:
-    """Log weights of structures with as many effects, the likeliest one's its :func:`_plain`; those of one family share
-    by their prices.
+    """Log weights of structures with as many effects, the likeliest one's its :func:`_of_any_size`; those of one family
+    share by their prices.
     """
     groups = by_families(some).values()
     leading = max((group[0] for group in groups), key=lambda one: log_weight(one, refit))
     found: dict[Candidate, float] = {}
     for group in groups:
-        leader = _plain(leading, calibration) + log_weight(group[0], refit) - log_weight(leading, refit)
+        leader = _of_any_size(leading, calibration) + log_weight(group[0], refit) - log_weight(leading, refit)
         prices = [-SHARPNESS * (one.price - group[0].price) / one.samples for one in group]
         share = leader - float(np.log(np.sum(np.exp(prices))))
         found |= {one.fit.candidate: share + price for one, price in zip(group, prices, strict=True)}

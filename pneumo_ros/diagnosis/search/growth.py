@@ -12,15 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Part, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.bands import sharpened_bands, with_bands
 from pneumo_ros.diagnosis.search.competition import room_for_more
 from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, fresh, one_exchanged, without
-from pneumo_ros.diagnosis.search.fitting import of_law, probed, ranked, short_fits, varied
+from pneumo_ros.diagnosis.search.fitting import by_cost, of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
 from pneumo_ros.diagnosis.search.screening import (
+    SMALL,
     CandidateScore,
     candidate_scores,
     compatible_parts,
@@ -36,10 +37,12 @@ from pneumo_ros.diagnosis.search.selection import (
     gained,
     likeliest,
     log_weight,
+    relieved,
     score,
     select,
 )
 from pneumo_ros.diagnosis.search.state import Search
+from pneumo_ros.diagnosis.traits import ChangesNumbers
 from pneumo_ros.effects.parameters import Active, family_of
 
 MOST: Final = 6  # effects in a structure [numerics]
@@ -80,6 +83,8 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
             if rescanned.fit is not best.fit and _much_left(search, rescanned):
                 _climb(search, rescanned, max(limits.second_cost, limits.second_share * best.samples))
             best = _selected(search, limits)
+    if further and best.size and _relief(search, best, limits):
+        best = _selected(search, limits)
     if further and best.size >= THIRD:
         best = _polished(search, best, limits)
     if best.size > 1:
@@ -93,6 +98,8 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     sharper = sharpened_bands(search.problem, sharper, search.effort.long)
     if sharper is not best.fit:
         search.structures.append(sharper)
+        best = _selected(search, limits)
+    if further and best.size and _relief(search, best, limits):
         best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
@@ -200,6 +207,33 @@ def _rescanned(search: Search, found: Fit) -> bool:
     return True
 
 
+def _relief(search: Search, best: Scored, limits: Thresholds) -> bool:
+    """Fit the structure with one effect more that changes the rig's own numbers, where its tolerances may answer for
+    one; whether any lets them come back.
+
+    They can answer for such an effect wholly, so that what is left, which the others are found by, says nothing of it.
+    """
+    problem = search.problem
+    if best.stretch < limits.relief or best.size >= MOST:
+        return False
+    effects = problem.model.effects
+    numbers = [e.id for e in effects.values() if isinstance(e, ChangesNumbers) and e.changes_numbers]
+    own = [part for part in compatible_parts(problem, best.fit.candidate.laws) if part[0] in numbers]
+
+    def beside(law: Part) -> Fit:
+        """From a small size, with sensitivities of its own: the tolerances move far and all together."""
+        candidate = Candidate((*best.fit.candidate.parts, law))
+        small = [p.typical * SMALL if p.size else p.typical for p in problem.parameters_of[law]]
+        values = [*problem.values(best.fit.candidate, best.fit.x), *small]
+        start = problem.start(candidate, best.fit.x[: problem.fixed], values)
+        return fit(problem, candidate, start, None, iterations=search.effort.long)
+
+    laws = by_cost(one for one in problem.each(beside, own) if not one.diverged)[: COUNTS[2]]
+    found = [*laws, *shaped(problem, laws)]
+    search.structures += found
+    return any(relieved(best, score(problem, one), limits) for one in found)
+
+
 def _much_left(search: Search, one: Scored) -> bool:
     """Whether a structure leaves so much that others may serve better."""
     return one.level > max(MISFIT, MISFIT_OF_REFIT * score(search.problem, search.refit).level)
@@ -273,7 +307,8 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
             break
         fewer = reduced(problem, found, of_law(found.candidate, law))
         more, less = score(problem, found), score(problem, fewer)
-        if gained(less, more) < limits.second or fewer.cost - found.cost < limits.second_cost:
+        shown = gained(less, more) >= limits.second and fewer.cost - found.cost >= limits.second_cost
+        if not shown and not relieved(less, more, limits):
             found = fewer
     if found is not best.fit:
         search.structures.append(found)

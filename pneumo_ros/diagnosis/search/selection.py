@@ -59,6 +59,8 @@ class Thresholds:
     least : fall of mean square (in sigmas, which hold the model-form floor) below which nothing is evidence
     model_form : share of the misfit's root mean square that laws of the right kind may leave; no second effect is
         inferred from less
+    relief : fall of the squares of strained tolerances, prior sigmas, that is evidence for a further effect which
+        leaves no more than there was
     """
 
     first: float = 0.1
@@ -70,6 +72,7 @@ class Thresholds:
     alone: float = 2.5
     least: float = 0.06
     model_form: float = 0.01
+    relief: float = 9.0
 
 
 @lru_cache(maxsize=1)
@@ -87,6 +90,7 @@ def null_thresholds() -> Thresholds:
         first_cost=max(floor.first_cost, chance("cost", 1)),
         second_cost=max(floor.second_cost, chance("cost", 2)),
         least=max(floor.least, chance("fall", 1)),
+        relief=max(floor.relief, chance("relief", 2)),
     )
 
 
@@ -245,6 +249,17 @@ def gained(poorer: Scored, richer: Scored) -> float:
     return max(kept, min(0.5 * (kept + fitted), 2.0 * kept))
 
 
+def relieved(poorer: Scored, richer: Scored, limits: Thresholds) -> bool:
+    """Whether a further effect lets strained tolerances come back by so much that it is there, whatever is left.
+
+    What changes the rig's own numbers, a load, tolerances may answer for wholly: then nothing is left to show it, but
+    they are farther from what the maker states than chance takes them. What it costs otherwise counts against it.
+    """
+    relief = poorer.stretch - richer.stretch
+    paid = poorer.price - richer.price
+    return min(relief, paid + PARAMETER_PENALTY) > limits.relief and richer.level < (1.0 + SAME) * poorer.level
+
+
 def standard_error(one: Scored, other: Scored) -> float:
     """Of the difference of their levels over the blocks."""
     difference = one.blocks - other.blocks
@@ -273,6 +288,7 @@ def select(refit: Scored, finalists: Sequence[Scored], limits: Thresholds) -> Sc
             evidence = shown or (paid > limits.alone * cost and fallen > -SAME * poorer.level)
         else:
             evidence = shown and fallen > limits.model_form**2 * refit.level
+            evidence = evidence or relieved(poorer, best, limits)
         if evidence:
             chosen = best
     return chosen
