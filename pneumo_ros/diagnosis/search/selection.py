@@ -5,7 +5,8 @@ Among structures of the same families the one of lowest price; among those of ot
 largest weight (:func:`log_weight`): what is left on the fitted and on the kept blocks counts only beyond what laws of
 the right kind leave, and each unknown has its price.
 A richer structure must beat a poorer one on the kept blocks by more than structures without a true effect do (null
-thresholds, made by bench/null_distribution.py), and by more than the laws of the library are true to.
+thresholds, made by bench/null_distribution.py), and by more than the laws of the library are true to; or let the
+tolerances come back from where they answer for what is missing (:func:`relieved`).
 """
 
 from __future__ import annotations

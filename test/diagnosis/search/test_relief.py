@@ -23,7 +23,7 @@ from pneumo_ros.rig import load_rig
 MODEL = RigModel(load_rig())
 LIMITS = Thresholds()
 SLOW = Active("valve_lag", "rear", (0.036, 0.8))
-LOAD = 1.5  # kg, three standard deviations of the body's mass
+LOAD = 1.5  # kg, six standard deviations of the mass of the body, which is 50.3 kg
 
 
 def search_of(*active: Active) -> tuple[Search, Scored]:
