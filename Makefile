@@ -7,6 +7,8 @@ READY := $(VENV)/.ready
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export MPLBACKEND ?= Agg
 export OPENBLAS_NUM_THREADS ?= 1
+# Where Python may keep no byte code each process translates two seconds' worth of libraries anew, and tests start hundreds.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test lint types kernels unit colcon floors other other-environment headers bench mutants docs real blind blind-ci lock clean help
 
