@@ -21,7 +21,7 @@ from pneumo_ros.diagnosis.result import Ranked
 from pneumo_ros.diagnosis.search.selection import Scored, log_weight
 from pneumo_ros.effects.parameters import Active, family_of
 
-TOLD: Final = 10  # finalists in the ranking: each costs a run of the held-out log and its sensitivities [taste]
+TOLD: Final = 6  # finalists in the ranking: each costs a run of the held-out log and its sensitivities [taste]
 
 
 def rank(outcome: Outcome, opinion: Opinion) -> list[Ranked]:

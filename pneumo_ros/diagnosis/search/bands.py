@@ -42,11 +42,14 @@ class Sticks(Protocol):
 
 def with_bands(problem: Problem, base: Fit) -> Problem:
     """The problem with start values of every shape that may stick, beside a fit that has none of its family there; the
-    problem itself where none explains anything.
+    problem itself where none explains anything. At both ends with one band only where each end explains something by
+    one of its own: half of two that stick explains less than both, but not nothing.
     """
-    found = {}
+    found: dict[Part, tuple[float, ...]] = {}
     for shape, which in _shapes_that_stick(problem.model):
         if not all(compatible(problem.model, shape, part) for part in base.candidate.parts):
+            continue
+        if shape[1] == "both" and sum(name == shape[0] for name, _ in found) < 2:
             continue
         best = _best(problem, base, shape, which, _bands(problem, shape, which[1]))
         if best is not None:
@@ -79,8 +82,9 @@ def sharpened_bands(problem: Problem, found: Fit, iterations: int) -> Fit:
 
 def _shapes_that_stick(model: Model) -> list[tuple[Part, tuple[int, int]]]:
     """Id and site of every shape that may stick, with :attr:`Sticks.sticks`."""
-    return [((e.id, site), e.sticks) for e in model.effects.values() if isinstance(e, Sticks) and e.sticks
-            for site in e.sites]  # fmt: skip
+    shapes = [((e.id, site), e.sticks) for e in model.effects.values() if isinstance(e, Sticks) and e.sticks
+              for site in e.sites]  # fmt: skip
+    return sorted(shapes, key=lambda one: one[0][1] == "both")  # each end before both of them
 
 
 def _best(

@@ -83,7 +83,8 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
             if rescanned.fit is not best.fit and _much_left(search, rescanned):
                 _climb(search, rescanned, max(limits.second_cost, limits.second_share * best.samples))
             best = _selected(search, limits)
-    if further and best.size and _relief(search, best, limits):
+    asked: set[frozenset[Part]] = set()
+    if further and best.size and _relief(search, best, limits, asked):
         best = _selected(search, limits)
     if further and best.size >= THIRD:
         best = _polished(search, best, limits)
@@ -99,7 +100,7 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
     if sharper is not best.fit:
         search.structures.append(sharper)
         best = _selected(search, limits)
-    if further and best.size and _relief(search, best, limits):
+    if further and best.size and _relief(search, best, limits, asked):
         best = _selected(search, limits)
     if best.size and best.fit.candidate.shapes:
         search.structures.append(_without_idle_shapes(search, best.fit))
@@ -207,18 +208,20 @@ def _rescanned(search: Search, found: Fit) -> bool:
     return True
 
 
-def _relief(search: Search, best: Scored, limits: Thresholds) -> bool:
+def _relief(search: Search, best: Scored, limits: Thresholds, asked: set[frozenset[Part]]) -> bool:
     """Fit the structure with one effect more that changes the rig's own numbers, where its tolerances may answer for
     one; whether any lets them come back.
 
     They can answer for such an effect wholly, so that what is left, which the others are found by, says nothing of it.
+    ``asked`` holds the effects of those structures that were asked already, and this one's afterwards.
     """
-    problem = search.problem
-    if best.stretch < limits.relief or best.size >= MOST:
+    problem, own = search.problem, frozenset(best.fit.candidate.laws)
+    if best.stretch < limits.relief or best.size >= MOST or own in asked:
         return False
+    asked.add(own)
     effects = problem.model.effects
     numbers = [e.id for e in effects.values() if isinstance(e, ChangesNumbers) and e.changes_numbers]
-    own = [part for part in compatible_parts(problem, best.fit.candidate.laws) if part[0] in numbers]
+    there = [part for part in compatible_parts(problem, best.fit.candidate.laws) if part[0] in numbers]
 
     def beside(law: Part) -> Fit:
         """From a small size, with sensitivities of its own: the tolerances move far and all together."""
@@ -228,8 +231,9 @@ def _relief(search: Search, best: Scored, limits: Thresholds) -> bool:
         start = problem.start(candidate, best.fit.x[: problem.fixed], values)
         return fit(problem, candidate, start, None, iterations=search.effort.long)
 
-    laws = by_cost(one for one in problem.each(beside, own) if not one.diverged)[: COUNTS[2]]
-    found = [*laws, *shaped(problem, laws)]
+    laws = by_cost(one for one in problem.each(beside, there) if not one.diverged)[: COUNTS[2]]
+    cheaper = [one for one in laws if score(problem, one).price < best.price]  # what costs more does not relieve
+    found = [*laws, *shaped(problem, cheaper)]
     search.structures += found
     return any(relieved(best, score(problem, one), limits) for one in found)
 

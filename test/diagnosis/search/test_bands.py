@@ -48,6 +48,14 @@ def test_the_band_is_found_beside_what_is_known(beside: tuple[Active, ...]) -> N
     assert band_of(found[SHAPE]) == pytest.approx(BAND, rel=RATIO - 1.0)
 
 
+@pytest.mark.parametrize("site", ["front", "both"])
+def test_both_ends_are_scanned_together_where_each_may_stick(site: str) -> None:
+    problem = problem_of(Active(SHAPE[0], site, STUCK.values))
+    found = with_bands(problem, refreshed(problem, fitted(problem, Candidate()))).scanned
+    assert ((SHAPE[0], "both") in found) == (site == "both")
+    assert band_of(found[SHAPE[0], site]) == pytest.approx(BAND, rel=RATIO - 1.0)
+
+
 def test_a_spool_whose_band_nobody_tries_is_named() -> None:
     search = compete(problem_of(STUCK), Effort(singles=4, finalists=2), False, lambda share, what: None)
     best = search.best

@@ -9,7 +9,7 @@ import pytest
 from helpers.own_logs import driven
 from helpers.rig_logs import excitation, signals_of
 
-from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
 from pneumo_ros.diagnosis.search import growth
 from pneumo_ros.diagnosis.search.selection import SAME, Scored, Thresholds, relieved, score, select
@@ -40,7 +40,9 @@ def search_of(*active: Active) -> tuple[Search, Scored]:
 
 def test_a_load_that_tolerances_answer_for_is_found() -> None:
     search, before = search_of(SLOW, Active("payload", "", (LOAD,)))
-    assert growth._relief(search, before, LIMITS)
+    asked: set[frozenset[Part]] = set()
+    assert growth._relief(search, before, LIMITS, asked)
+    assert not growth._relief(search, before, LIMITS, asked)  # the same again would find the same
     problem = search.problem
     chosen = select(score(problem, search.refit), [score(problem, one) for one in search.finalists], LIMITS)
     assert {law for law, _ in chosen.fit.candidate.laws} == {"valve_lag", "payload"}
@@ -52,7 +54,7 @@ def test_a_load_that_tolerances_answer_for_is_found() -> None:
 
 def test_where_nothing_is_hidden_tolerances_tell_nothing() -> None:
     search, before = search_of(SLOW)
-    assert not growth._relief(search, before, LIMITS)
+    assert not growth._relief(search, before, LIMITS, set())
     assert growth._selected(search, LIMITS).size == 1
 
 
