@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from helpers.own_logs import driven
 from helpers.rig_logs import excitation, signals_of
@@ -50,6 +51,15 @@ def test_a_load_that_tolerances_answer_for_is_found() -> None:
     values = problem.values(chosen.fit.candidate, chosen.fit.x)
     parameters = problem.effect_parameters(chosen.fit.candidate)
     assert values[[p.name for p in parameters].index("payload")] == pytest.approx(LOAD, rel=0.4)
+
+
+@pytest.mark.parametrize("relief", [LIMITS.relief, np.inf], ids=["asked", "not asked"])
+def test_growth_asks_what_tolerances_answer_for(relief: float) -> None:
+    search, _ = search_of(SLOW, Active("payload", "", (LOAD,)))
+    limits = replace(LIMITS, relief=relief)
+    growth.grow(search, limits)
+    assert ("payload", "") in growth._selected(search, limits).fit.candidate.laws or relief > LIMITS.relief
+    assert growth._selected(search, limits).size == 1 + (relief == LIMITS.relief)
 
 
 def test_where_nothing_is_hidden_tolerances_tell_nothing() -> None:
