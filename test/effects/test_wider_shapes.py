@@ -90,6 +90,29 @@ def test_friction_that_saturates_late_and_a_damper_that_opens_early_are_the_same
         assert left_of(np.array(atoms).T, signs(shape), law, rate[:, None]) < 0.1, family
 
 
+@pytest.mark.parametrize(("bent", "rest"), [(2.0, 1.5e5), (2.0, 3e5), (0.0, 2.5e5)])
+def test_bellows_that_widen_with_pressure_are_an_area_error(bent: float, rest: float) -> None:
+    """e (q + bent q^2), q the pressure over that at rest in 100 kPa: the second power is more than half of it once the
+    valves have moved the pressure by 50 kPa.
+    """
+    from pneumo_ros.effects.shapes.force import ATOMS, force
+
+    shape = SHAPES["effective_area_error.shape"]
+    gauge = rest + np.linspace(-1e5, 1.5e5, 101)
+    over = (gauge - rest) / 1e5
+    law = 0.01 * (over + bent * over**2) * gauge * 1.6e-3
+    atoms = []
+    for column in shape.columns:
+        p = tuple(float(k == column) for k in range(len(ATOMS)))
+        seen = (Strut(0.0457, 0.0, float(one), 1.6e-3, 0.0, 0.0, 0.0) for one in gauge)
+        atoms.append([force(one, (0.0,) * 8, p) for one in seen])
+    table = np.array(atoms).T
+    assert left_of(table, signs(shape), law, gauge[:, None]) < 1e-3
+    straight = [k for k, one in enumerate(shape.parameters) if one.name != "area pressure squared"]
+    less = left_of(table[:, straight], [signs(shape)[k] for k in straight], law, gauge[:, None])
+    assert (less > 0.1) == (bent > 0.0)
+
+
 def test_sliders_of_all_lengths_are_a_hysteresis() -> None:
     """Slip forces of a power law up to 5 mm (Segalman 2005), most of them short: not friction beside a hysteresis."""
     time = np.arange(6000) * PERIOD

@@ -61,6 +61,7 @@ ATOMS = (
     *(Atom(f"memory {t:g} s", "N/m", 500.0) for t in LAGS),
     Atom("constant", "N", 2.0, signed=True),
     *(Atom(f"deep slider {s:g} m", "N", 3.0) for s in SLACKS[2:4]),
+    Atom("area pressure squared", "1", 0.02, signed=True),
 )
 Values = tuple[float, ...]
 
@@ -104,8 +105,8 @@ def force(strut: Strut, z: State, p: Values) -> float:
         out -= (p[28] * v + p[30] * min(v, 0.0)) * near + p[29] * v * far
     if h > STRAPS[0]:
         out -= p[25] * (h - STRAPS[0]) + p[26] * max(0.0, h - STRAPS[1]) + p[27] * max(0.0, h - STRAPS[2])
-    x = (h - MIDDLE) * PER_SWING
-    out += strut.gauge * strut.area * (p[31] + p[32] * x + p[33] * x * x + p[34] * (load - 1.0))
+    x, over = (h - MIDDLE) * PER_SWING, load - 1.0
+    out += strut.gauge * strut.area * (p[31] + p[32] * x + p[33] * x * x + p[34] * over + p[43] * over * over)
     out += p[35] * (h - MIDDLE) + p[36] * x * abs(x)
     out -= max(0.0, 1.0 - x) * (p[41] * z[2] + p[42] * z[3])
     return out - p[37] * (h - z[5]) - p[38] * (h - z[6]) - p[39] * (h - z[7])
