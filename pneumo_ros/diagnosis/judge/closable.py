@@ -18,7 +18,7 @@ from pneumo_ros.arrays import Array
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem, stated_form
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.fit.uncertainty import at_bounds
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, Equations, kept, left_in, mean_in, mended_in
+from pneumo_ros.diagnosis.judge.equations import Equations, held_up, kept, left_in, mean_in, mended_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.model import HasCeilings
 from pneumo_ros.diagnosis.record import Record
@@ -112,10 +112,7 @@ class EffectEvidence:
     @property
     def held_up(self) -> float:
         """How much more the equations miss without the effect, over what they miss with it; 0 where nobody looked."""
-        if self.missing is None:
-            return 0.0
-        own = max(self.missing[0], EXPLAINED)
-        return max(self.missing[1] - own, 0.0) / own
+        return 0.0 if self.missing is None else held_up(*self.missing)
 
 
 @dataclass(frozen=True)

@@ -45,6 +45,14 @@ def kept(left: float, before: float) -> float:
     return max(left - EXPLAINED, 0.0) / max(before - EXPLAINED, SHOWN)
 
 
+def held_up(left: float, without: float) -> float:
+    """How much more the equations miss without an effect, over what they miss with it: 0 where they do not miss it,
+    above one where they miss more than twice as much and so hold it up. Mean squares in null variances.
+    """
+    own = max(left, EXPLAINED)
+    return max(without - own, 0.0) / own
+
+
 def left_in(equations: Equations, problem: Problem, one: Fit) -> Array:
     """Mean square that a structure leaves in each equation, (E,), null variances."""
     return equations.left(problem.nuisance(one.x), problem.active(one.candidate, problem.values(one.candidate, one.x)))

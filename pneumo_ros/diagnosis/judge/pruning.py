@@ -16,7 +16,7 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit
-from pneumo_ros.diagnosis.judge.equations import EXPLAINED, SHOWN, Equations, left_in
+from pneumo_ros.diagnosis.judge.equations import EXPLAINED, SHOWN, Equations, held_up, left_in
 from pneumo_ros.diagnosis.judge.held_out_runs import held_by
 from pneumo_ros.diagnosis.record import Record
 from pneumo_ros.diagnosis.search.fitting import of_law
@@ -25,9 +25,6 @@ from pneumo_ros.diagnosis.search.parts import reduced
 # Times as much (rms) that a structure leaves with an effect as without it, from which on the effect does harm
 # [calibration: set 0.5, opened]
 HARM: Final = 1.25
-# Times as much (mean square) that the equations miss without an effect, from which on they hold it up whatever the run
-# says: the same as in the verdict's exceptions [taste]
-HELD_UP: Final = 2.0
 STEPS: Final = 4  # iterations of a fit with an effect taken away [numerics]
 
 
@@ -76,5 +73,4 @@ def harm(own: tuple[float, float], bare: tuple[float, float]) -> float:
     """
     shown = own[1] > EXPLAINED + SHOWN
     missed = float(np.sqrt(own[1] / max(bare[1], EXPLAINED))) if shown else 0.0
-    held_up = bare[1] > HELD_UP * max(own[1], EXPLAINED)
-    return missed if held_up else max(own[0] / max(bare[0], 1e-12), missed)
+    return missed if held_up(own[1], bare[1]) > 1.0 else max(own[0] / max(bare[0], 1e-12), missed)
