@@ -18,27 +18,22 @@ from pneumo_ros.rig import Rig
 COMMAND_DELAY = "command_delay"
 COMMAND_DELAY_STD = 1.5e-4  # s; rigs without a fault show up to 0.12 ms
 SLOPE_SHARE = 0.5  # of the volume scale's tolerance, for the slope of V(h) about the design height
-# Nuisance parameter -> the rig's quantity. What two parts have each (bushings, springs) is free for each. Beside them
-# the slope of V(h) has a tolerance of its own: a common factor alone would make V/(dV/dh), the air's stiffness, exact.
+# Nuisance parameter -> the rig's quantity.
 NUISANCE = {
-    "sprung_mass": "sprung_mass",
-    "pitch_inertia": "pitch_inertia",
-    "unsprung_mass_front": "unsprung_mass_front",
-    "unsprung_mass_rear": "unsprung_mass_rear",
-    "tyre_stiffness_front": "tyre_stiffness_front",
-    "tyre_stiffness_rear": "tyre_stiffness_rear",
-    "bushing_damping_front": "bushing_damping",
-    "bushing_damping_rear": "bushing_damping",
-    "supply_pressure": "supply_pressure",
-    "outlet_area_front": "outlet_area_front",
-    "outlet_area_rear": "outlet_area_rear",
-    "effective_area_scale_front": "effective_area_scale",
-    "effective_area_scale_rear": "effective_area_scale",
-    "volume_scale_front": "volume_scale",
-    "volume_scale_rear": "volume_scale",
-    "discharge_coefficient_front": "discharge_coefficient",
-    "discharge_coefficient_rear": "discharge_coefficient",
-}
+    name: name
+    for name in ("sprung_mass", "pitch_inertia", "unsprung_mass_front", "unsprung_mass_rear", "tyre_stiffness_front",
+                 "tyre_stiffness_rear", "bushing_damping", "supply_pressure", "outlet_area_front", "outlet_area_rear",
+                 "effective_area_scale", "volume_scale", "discharge_coefficient")
+}  # fmt: skip
+# What the rig has one number of for two parts of a kind. Its maker is unsure of the kind, and much less of how the two
+# differ: they share what the number is off by, and half their difference, as a share of their mean, has a tolerance of
+# its own (``end_difference``). Were each free by itself, a difference that no draw of the number makes would count as
+# one: an orifice that is worn at one end, or a load that is not where it should be.
+SHARED = ("bushing_damping", "effective_area_scale", "volume_scale", "discharge_coefficient")
+# Beside them the slope of V(h): a common factor alone would make V/(dV/dh), the air's stiffness, exact.
+SLOPE = "volume_slope"
+SPLIT = "_split"
+SIDES = ("front", "rear")
 
 
 @lru_cache(maxsize=32)
@@ -50,28 +45,52 @@ def nominal_plant(rig: Rig, step: float) -> HalfCar:
     return half_car(rig, (front, rear), step=step)
 
 
-def plant_with(rig: Rig, base: HalfCar, v: Mapping[str, float]) -> Plant:
-    """The nominal plant with other values ``v`` of nuisance parameters, SI by name."""
+def stated(rig: Rig) -> dict[str, float]:
+    """What the rig states each nuisance parameter to be, SI, among it what its ends have of their own."""
+    own = dict(rig.ends)
+    values = {name: own.get(name, getattr(rig, quantity).value) for name, quantity in NUISANCE.items()}
+    for name in (*SHARED, SLOPE):
+        front, rear = (own.get(f"{name}_{end}", values.get(name, 1.0)) for end in SIDES)
+        values[name] = 0.5 * (front + rear)
+        values[name + SPLIT] = (front - rear) / (front + rear) if front + rear else 0.0
+    return values
+
+
+def of_ends(values: Mapping[str, float]) -> dict[str, float]:
+    """What each end has of its own, by the names of a rig file's ``ends:``, of nuisance parameters by name."""
+    own = {name: values[name] for name in values if name.startswith("outlet_area")}
+    for name in (*SHARED, SLOPE):
+        if name in values:
+            split = values.get(name + SPLIT, 0.0)
+            own |= {f"{name}_{end}": values[name] * share for end, share in zip(SIDES, (1.0 + split, 1.0 - split),
+                                                                               strict=True)}  # fmt: skip
+    return own
+
+
+def plant_with(rig: Rig, base: HalfCar, values: Mapping[str, float]) -> Plant:
+    """The nominal plant with other values of nuisance parameters, SI by name; the others as the rig states them."""
+    v = {**stated(rig), **values}
+    own = of_ends(v)
     body = base.body
     body = body._replace(
         **{name: v[name] for name in body._fields if name in v},
-        damping_front=v.get("bushing_damping_front", body.damping_front),
-        damping_rear=v.get("bushing_damping_rear", body.damping_rear),
-        area_scale_front=v.get("effective_area_scale_front", body.area_scale_front),
-        area_scale_rear=v.get("effective_area_scale_rear", body.area_scale_rear),
+        damping_front=own["bushing_damping_front"],
+        damping_rear=own["bushing_damping_rear"],
+        area_scale_front=own["effective_area_scale_front"],
+        area_scale_rear=own["effective_area_scale_rear"],
     )
-    return Plant(body, _gas(rig, base.front, v, "front"), _gas(rig, base.rear, v, "rear"))
+    supply = v["supply_pressure"]
+    return Plant(body, _gas(rig, base.front, own, supply, "front"), _gas(rig, base.rear, own, supply, "rear"))
 
 
-def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
-    volume = v.get(f"volume_scale_{end}", rig.volume_scale.value)
-    slope = volume * v.get(f"volume_slope_{end}", 1.0)
+def _gas(rig: Rig, gas: Gas, own: Mapping[str, float], supply: float, end: str) -> Gas:
+    volume = own[f"volume_scale_{end}"]
+    slope = volume * own[f"{SLOPE}_{end}"]
     level = VOLUME_OFFSET + MEAN_AREA * rig.design_height.value
-    coefficient = v.get(f"discharge_coefficient_{end}", rig.discharge_coefficient.value)
-    supply = v.get("supply_pressure", gas.supply_pressure)
+    coefficient = own[f"discharge_coefficient_{end}"]
     # The log carries the commanded outlet; the estimate is of the opening that the nominal command really gives.
     nominal = getattr(rig, f"outlet_area_{end}").value
-    opening = v.get(f"outlet_area_{end}", nominal) / nominal if nominal > 0.0 else 1.0
+    opening = own[f"outlet_area_{end}"] / nominal if nominal > 0.0 else 1.0
     return gas._replace(
         supply_pressure=supply,
         supply_power=(gas.reference_pressure / supply) ** gas.k,
@@ -84,13 +103,15 @@ def _gas(rig: Rig, gas: Gas, v: Mapping[str, float], end: str) -> Gas:
 
 def nuisance_parameters(rig: Rig) -> tuple[Parameter, ...]:
     """Nuisance parameters of a rig; a quantity without tolerance is exact and stays."""
-    found, own = [], dict(rig.ends)
-    for name, source in NUISANCE.items():
-        q = getattr(rig, source)
+    found, centre = [], stated(rig)
+    share = rig.end_difference.value
+    for name, q in {name: getattr(rig, quantity) for name, quantity in NUISANCE.items()}.items():
         if q.std > 0.0:
-            found.append(Parameter(name, q.unit, own.get(name, q.value), q.std))
+            found.append(Parameter(name, q.unit, centre[name], q.std))
+        if name in SHARED and q.value and share * q.std > 0.0:
+            found.append(Parameter(name + SPLIT, "1", centre[name + SPLIT], share * q.std / abs(q.value)))
     slope = SLOPE_SHARE * rig.volume_scale.std
-    slopes = [f"volume_slope_{end}" for end in ("front", "rear")] if slope > 0.0 else []
-    found += [Parameter(name, "1", own.get(name, 1.0), slope) for name in slopes]
+    if slope > 0.0:  # no number of the rig's: what the springs' curves differ by is as open as what they have in common
+        found += [Parameter(name, "1", centre[name], slope) for name in (SLOPE, SLOPE + SPLIT)]
     found.append(Parameter(COMMAND_DELAY, "s", 0.0, COMMAND_DELAY_STD))
     return tuple(found)

@@ -296,7 +296,7 @@ class RigModel:
             values = (
                 () if nuisance is None else zip((p.name for p in self.parameters), map(float, nuisance), strict=True)
             )
-            plant = plant_with(self.rig, self._base, {**dict(self.rig.ends), **dict(values)})
+            plant = plant_with(self.rig, self._base, dict(values))
             if len(self._plants) >= PLANTS:
                 self._plants.clear()
             self._plants[key] = plant

@@ -46,10 +46,14 @@ LIMITS: dict[str, Limit] = {
     "model_form": Limit(
         "1", 0.0, 0.5, "share of each channel's std below which a difference is no effect to its maker"
     ),
+    "end_difference": Limit(
+        "1", 0.0, 3.0, "half the difference of both ends where they share a number, as a share of that number's std"
+    ),
 }
 
-OPTIONAL = {"length_scale": 5.0, "model_form": 0.0}
-"""Numbers that a text may leave out, and what that means: the first is the thesis's Honda Civic over its rig."""
+OPTIONAL = {"length_scale": 5.0, "model_form": 0.0, "end_difference": 0.2}
+"""Numbers that a text may leave out, and what that means: the first is the thesis's Honda Civic over its rig, the last
+two parts of a kind, which differ by less than their maker knows the kind."""
 
 # What an end may have of its own where the rig has one number for both, or where the command is not what happens.
 END_LIMITS: dict[str, Limit] = {

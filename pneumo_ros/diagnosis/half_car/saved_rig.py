@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rig after diagnosis, as a file that every verb takes.
 
-``rig:`` holds what controllers and estimators may believe: parameters at their estimates (the mean of front and rear
-where the rig has one number for both), and effects that are a number of the rig. ``ends:`` holds what each end has of
-its own, ``effects:`` everything else. The commanded outlet areas stay as they are: what is estimated is the opening
-that this command really gives, and it is an end's own.
+``rig:`` holds what controllers and estimators may believe: parameters at their estimates, and effects that are a number
+of the rig. ``ends:`` holds what each end has of its own, ``effects:`` everything else. The commanded outlet areas stay
+as they are: what is estimated is the opening that this command really gives, and it is an end's own.
 """
 
 from __future__ import annotations
@@ -15,17 +14,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from pneumo_ros.diagnosis.result import Diagnosis
 from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.loading import origin_of
-from pneumo_ros.effects.nuisance import NUISANCE
+from pneumo_ros.effects.nuisance import NUISANCE, of_ends, stated
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.errors import InputError
 from pneumo_ros.files import new_file
-from pneumo_ros.rig import END_LIMITS, LIMITS, NamedEffect, Rig
+from pneumo_ros.rig import LIMITS, NamedEffect, Rig
 
 # Numbers of the rig that its ends have of their own [definition]
 _OUTLETS: Final = ("outlet_area_front", "outlet_area_rear")
@@ -34,13 +31,10 @@ _OUTLETS: Final = ("outlet_area_front", "outlet_area_rear")
 def corrected_rig(found: Diagnosis, model: RigModel) -> Rig:
     """The model's rig as diagnosed: its numbers, what its ends have of their own, its effects."""
     estimates = {name: estimate.value for name, estimate in found.nuisance.items()}
-    means: dict[str, list[float]] = {}
-    for name, quantity in NUISANCE.items():
-        if name in estimates and quantity not in _OUTLETS:
-            means.setdefault(quantity, []).append(estimates[name])
-    rig = model.rig.with_values(**{quantity: float(np.mean(numbers)) for quantity, numbers in means.items()})
+    numbers = {name: estimates[name] for name in NUISANCE if name in estimates and name not in _OUTLETS}
+    rig = model.rig.with_values(**numbers)
     base = model.plant()
-    own = {**dict(rig.ends), **{name: value for name, value in estimates.items() if name in END_LIMITS}}
+    own = {**dict(rig.ends), **of_ends({**stated(model.rig), **estimates})}
     own |= {"reference_pressure_front": base.front.reference_pressure,
             "reference_pressure_rear": base.rear.reference_pressure}  # fmt: skip
     rig, rest = _folded(rig, found.active)
