@@ -8,6 +8,7 @@ close: the misfit of a law must not pass for a second effect.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -210,7 +211,7 @@ def _rescanned(search: Search, found: Fit) -> bool:
 
 def _relief(search: Search, best: Scored, limits: Thresholds, asked: set[frozenset[Part]]) -> bool:
     """Fit the structure with one effect more that changes the rig's own numbers, where its tolerances may answer for
-    one; whether any lets them come back.
+    one; whether any lets them come back. The best that does is fitted without each earlier one of these as well.
 
     They can answer for such an effect wholly, so that what is left, which the others are found by, says nothing of it.
     ``asked`` holds the effects of those structures that were asked already, and this one's afterwards.
@@ -235,7 +236,21 @@ def _relief(search: Search, best: Scored, limits: Thresholds, asked: set[frozens
     cheaper = [one for one in laws if score(problem, one).price < best.price]  # what costs more does not relieve
     found = [*laws, *shaped(problem, cheaper)]
     search.structures += found
-    return any(relieved(best, score(problem, one), limits) for one in found)
+    helped = [one for one in found if relieved(best, score(problem, one), limits)]
+    if helped:
+        search.structures += _without_others(search, min(helped, key=lambda one: score(problem, one).price), numbers)
+    return bool(helped)
+
+
+def _without_others(search: Search, found: Fit, numbers: Sequence[str]) -> list[Fit]:
+    """The structure without each of its earlier effects of some kinds: what stood in for the latest one, a load for a
+    shift of the centre of mass, need not be there beside it.
+    """
+    laws = [law for law in found.candidate.laws[:-1] if law[0] in numbers]
+    fewer = search.problem.each(
+        lambda law: reduced(search.problem, found, of_law(found.candidate, law), search.effort.long), laws
+    )
+    return [one for one in fewer if not one.diverged]
 
 
 def _much_left(search: Search, one: Scored) -> bool:

@@ -53,6 +53,20 @@ def test_a_load_that_tolerances_answer_for_is_found() -> None:
     assert values[[p.name for p in parameters].index("payload")] == pytest.approx(LOAD, rel=0.4)
 
 
+def test_what_stood_in_for_a_load_goes_once_the_load_is_there() -> None:
+    """A shift of the centre of mass, in a structure that has a load for it."""
+    search, _ = search_of(SLOW, Active("cg_shift", "", (0.006,)))
+    problem = search.problem
+    wrong = Candidate(((SLOW.effect, SLOW.site), ("payload", "")))
+    stood_in = fit(problem, wrong, problem.start(wrong, search.refit.x, (*SLOW.values, 0.5)), iterations=20)
+    search.structures = [stood_in]
+    before = score(problem, stood_in)
+    assert before.stretch > LIMITS.relief
+    assert growth._relief(search, before, LIMITS, set())
+    chosen = select(score(problem, search.refit), [score(problem, one) for one in search.finalists], LIMITS)
+    assert {law for law, _ in chosen.fit.candidate.laws} == {"valve_lag", "cg_shift"}
+
+
 @pytest.mark.parametrize("relief", [LIMITS.relief, np.inf], ids=["asked", "not asked"])
 def test_growth_asks_what_tolerances_answer_for(relief: float) -> None:
     search, _ = search_of(SLOW, Active("payload", "", (LOAD,)))
