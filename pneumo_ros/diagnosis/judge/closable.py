@@ -71,7 +71,8 @@ class EffectEvidence:
         square above noise; infinite where nobody looked, or where they hardly show a gap
     varied : how varied what its law is a function of was along the logs, see
         :class:`~pneumo_ros.diagnosis.traits.NeedsVariety`; infinite where its law needs no variety
-    props : whether the structure runs away without it: something else in it drives the rig, which nothing passive does
+    props : whether the structure runs away without it, as it is and fitted again: something else in it drives the rig,
+        which nothing passive does
     at_bounds, bent : how many of its parameters stand at a bound that is no natural end of its law; of its shape, those
         that bend it
     """
@@ -208,7 +209,8 @@ def closable(
                 missing = (mean_in(still, acting), mean_in(left_in(equations, problem, bare), acting))
         return EffectEvidence(
             law, at[law], _above(without, floor), own, ceiling.gap,
-            at_bounds=firm, bent=bent, varied=_varied(problem, law), props=refit < FAR <= without,
+            at_bounds=firm, bent=bent, varied=_varied(problem, law),
+            props=refit < FAR <= without and _runs_away_without(problem, best, holdout, law),
             follows=_followed(problem, bare, holdout, missed.predicted, law, at[law]), missing=missing, mended=mended,
             leaves=left / max(min(ceiling.total, left) + SLACK * without, 1e-12) if stated and left > floor else 1.0,
         )  # fmt: skip
@@ -226,6 +228,14 @@ def worth_asking(left: float, own: float, floor: float) -> bool:
     ``left`` and ``own`` : mean squares of the held-out gap above the floor; ``floor`` : as the contract's gap
     """
     return left + TRACE * floor**2 < (1.0 - WORTH) * own
+
+
+def _runs_away_without(problem: Problem, best: Fit, holdout: Record, law: Part) -> bool:
+    """Whether the rest of a structure, its numbers as they are, leaves the held-out log for good. A short fit of it may
+    end anywhere where the effect held nearly everything.
+    """
+    bare = reduced(problem, best, of_law(best.candidate, law), iterations=0)
+    return held_by(problem, bare, holdout).total >= FAR
 
 
 def _varied(problem: Problem, law: Part) -> float:

@@ -11,7 +11,7 @@ from helpers.own_logs import log
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
 from pneumo_ros.diagnosis.fit.solver import fit
-from pneumo_ros.diagnosis.judge.closable import ENOUGH, closable, followed, worth_asking
+from pneumo_ros.diagnosis.judge.closable import ENOUGH, _runs_away_without, closable, followed, worth_asking
 from pneumo_ros.diagnosis.judge.held_out import total_floor
 from pneumo_ros.effects.parameters import STILL_FOLLOWS, Active
 from pneumo_ros.effects.rig_model import RigModel
@@ -70,3 +70,22 @@ def test_a_gauge_that_clips_in_the_fitted_log_alone_is_no_scale(clips: bool, fol
     base = fit(problem, Candidate(), problem.start(Candidate(), None, ()), iterations=4)
     told = closable(problem, base, best, held, total_floor(held), 0.5, ())
     assert (told.effects[0].follows > 1.0) is follows
+
+
+def test_a_structure_is_driven_where_the_rest_of_it_runs_away_as_it_is() -> None:
+    """A force that pushes with the rate, held by a damper: without the damper it runs away, without the push nothing
+    does."""
+    model = RigModel(load_rig())
+    fitted, held = log(model, 1, None, ()), log(model, 2, None, ())
+    problem = Problem(model, (fitted,))
+    push, damper = ("anything.force", "front"), ("viscous_damping", "front")
+    structure = Candidate((damper, push))
+    names = [p.name for p in problem.effect_parameters(structure)]
+    values = np.zeros(len(names))
+    values[names.index("added_damping")] = 300.0
+    for name in ("damping_out", "damping_in"):
+        values[names.index(name)] = -250.0  # N s/m, beyond the bushing's 50
+    best = fit(problem, structure, problem.start(structure, None, tuple(values)), iterations=0)
+    assert not best.diverged
+    assert _runs_away_without(problem, best, held, damper)
+    assert not _runs_away_without(problem, best, held, push)
