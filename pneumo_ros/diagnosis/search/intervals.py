@@ -113,6 +113,9 @@ def intervals(problem: Problem, base: Fit) -> dict[Part, tuple[float, ...]]:
     out: dict[Part, tuple[float, ...]] = {}
     for (name, site, which), height in zip(shapes, heights, strict=True):
         best = simulated(problem, base, (name, site), which, [tried[k] for k in _peaks(height)])
+        for width in NEAR if best else ():  # here tolerances still answer; a fit that began beside them is kept there
+            near = list(_near(problem, best[0][which[1]], best[0][which[2]], width))
+            best = simulated(problem, base, (name, site), which, near) or best
         if best:
             out[name, site] = best[0]
     return out

@@ -29,7 +29,7 @@ from pneumo_ros.rig import load_rig
 
 MODEL = RigModel(load_rig())
 SHAPE = MODEL.library["transport_delay.shape"]
-INTERVAL, PHASE = 0.0713, 0.3  # s, of the interval
+INTERVAL, PHASE = 0.0613, 0.6  # s, of the interval
 SECONDS = 8.0
 DRIVER = tuple({"taken": 1.0, "interval": INTERVAL, "phase": PHASE}.get(p.name, 0.0) for p in SHAPE.parameters)
 TAKEN = Active("transport_delay.shape", "front", DRIVER)
@@ -88,7 +88,7 @@ def test_a_scanned_driver_explains_the_log_to_its_noise() -> None:
     found = dict(zip((p.name for p in parameters), map(float, values), strict=True))
     assert found["interval"] == pytest.approx(INTERVAL, rel=1e-3)
     (words,) = interval_words(search.problem, best)
-    assert words == "transport delay (front): the command is taken every 71.3 ms and kept until the next time"
+    assert words == "transport delay (front): the command is taken every 61.3 ms and kept until the next time"
     assert interval_words(search.problem, search.refit) == []
     assert found["delay"] + sum(v for name, v in found.items() if name.startswith("delay 0")) < 0.1
 
