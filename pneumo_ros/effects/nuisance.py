@@ -18,13 +18,12 @@ from pneumo_ros.rig import Rig
 COMMAND_DELAY = "command_delay"
 COMMAND_DELAY_STD = 1.5e-4  # s; rigs without a fault show up to 0.12 ms
 SLOPE_SHARE = 0.5  # of the volume scale's tolerance, for the slope of V(h) about the design height
-# Nuisance parameter -> the rig's quantity.
-NUISANCE = {
-    name: name
-    for name in ("sprung_mass", "pitch_inertia", "unsprung_mass_front", "unsprung_mass_rear", "tyre_stiffness_front",
-                 "tyre_stiffness_rear", "bushing_damping", "supply_pressure", "outlet_area_front", "outlet_area_rear",
-                 "effective_area_scale", "volume_scale", "discharge_coefficient")
-}  # fmt: skip
+# The rig's numbers that a fit may move within their tolerances.
+NUISANCE = (
+    "sprung_mass", "pitch_inertia", "unsprung_mass_front", "unsprung_mass_rear", "tyre_stiffness_front",
+    "tyre_stiffness_rear", "bushing_damping", "supply_pressure", "outlet_area_front", "outlet_area_rear",
+    "effective_area_scale", "volume_scale", "discharge_coefficient",
+)  # fmt: skip
 # What the rig has one number of for two parts of a kind. Its maker is unsure of the kind, and much less of how the two
 # differ: they share what the number is off by, and half their difference, as a share of their mean, has a tolerance of
 # its own (``end_difference``). Were each free by itself, a difference that no draw of the number makes would count as
@@ -33,7 +32,6 @@ SHARED = ("bushing_damping", "effective_area_scale", "volume_scale", "discharge_
 # Beside them the slope of V(h): a common factor alone would make V/(dV/dh), the air's stiffness, exact.
 SLOPE = "volume_slope"
 SPLIT = "_split"
-SIDES = ("front", "rear")
 
 
 @lru_cache(maxsize=32)
@@ -48,9 +46,9 @@ def nominal_plant(rig: Rig, step: float) -> HalfCar:
 def stated(rig: Rig) -> dict[str, float]:
     """What the rig states each nuisance parameter to be, SI, among it what its ends have of their own."""
     own = dict(rig.ends)
-    values = {name: own.get(name, getattr(rig, quantity).value) for name, quantity in NUISANCE.items()}
+    values = {name: own.get(name, getattr(rig, name).value) for name in NUISANCE}
     for name in (*SHARED, SLOPE):
-        front, rear = (own.get(f"{name}_{end}", values.get(name, 1.0)) for end in SIDES)
+        front, rear = (own.get(f"{name}_{end}", values.get(name, 1.0)) for end in ("front", "rear"))
         values[name] = 0.5 * (front + rear)
         values[name + SPLIT] = (front - rear) / (front + rear) if front + rear else 0.0
     return values
@@ -58,12 +56,11 @@ def stated(rig: Rig) -> dict[str, float]:
 
 def of_ends(values: Mapping[str, float]) -> dict[str, float]:
     """What each end has of its own, by the names of a rig file's ``ends:``, of nuisance parameters by name."""
-    own = {name: values[name] for name in values if name.startswith("outlet_area")}
+    own = {name: value for name, value in values.items() if name.startswith("outlet_area")}
     for name in (*SHARED, SLOPE):
         if name in values:
             split = values.get(name + SPLIT, 0.0)
-            own |= {f"{name}_{end}": values[name] * share for end, share in zip(SIDES, (1.0 + split, 1.0 - split),
-                                                                               strict=True)}  # fmt: skip
+            own[f"{name}_front"], own[f"{name}_rear"] = values[name] * (1.0 + split), values[name] * (1.0 - split)
     return own
 
 
@@ -105,7 +102,8 @@ def nuisance_parameters(rig: Rig) -> tuple[Parameter, ...]:
     """Nuisance parameters of a rig; a quantity without tolerance is exact and stays."""
     found, centre = [], stated(rig)
     share = rig.end_difference.value
-    for name, q in {name: getattr(rig, quantity) for name, quantity in NUISANCE.items()}.items():
+    for name in NUISANCE:
+        q = getattr(rig, name)
         if q.std > 0.0:
             found.append(Parameter(name, q.unit, centre[name], q.std))
         if name in SHARED and q.value and share * q.std > 0.0:

@@ -248,7 +248,7 @@ class RigModel:
 
     def changes(self, record: Drive) -> dict[str, float]:
         """Factor on each nuisance parameter that the record's own configuration states differently from this rig's."""
-        pairs = {name: (getattr(record.rig, q).value, getattr(self.rig, q).value) for name, q in NUISANCE.items()}
+        pairs = {name: (getattr(record.rig, name).value, getattr(self.rig, name).value) for name in NUISANCE}
         return {name: new / old for name, (new, old) in pairs.items() if old > 0.0 and new != old}
 
     def events(self, record: Drive) -> list[tuple[int, int]]:
