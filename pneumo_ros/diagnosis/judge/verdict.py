@@ -206,7 +206,10 @@ def judge(
     # What something elsewhere leaves less of acts as much less likely.
     effects = {one.law: told_probability(trust[one.law] * _in_structure(named, one.law), one.share,
                                          acts * min(1.0, one.instead), calibration) for one in evidence}  # fmt: skip
-    names = sorted({family_of(law[0]) for law, value in trust.items() if value > 0.5})
+    stands = {law for law, value in trust.items() if value > 0.5}
+    # What is no likelier than not stands only where nothing else does: between names that are as good, one is told.
+    likelier = {law for law in stands if effects[law] > 0.5}
+    names = sorted({family_of(law[0]) for law in likelier or stands})
     nameless = "unknown" if unknown >= scaled[refit.fit.candidate] else "none"
     return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 

@@ -72,6 +72,19 @@ def test_families_that_leave_what_laws_leave_are_told_apart_by_what_they_need() 
     assert far.verdict == "orifice_coefficient" and far.of("leak") < 1e-3
 
 
+def test_what_is_no_likelier_than_not_is_left_out_beside_what_is() -> None:
+    """A leak, beside a load or a shift that leave as much: no one of the two is likelier than not."""
+    refit, chosen = scored(400.0, 3000.0), scored(0.60, -500.0, "leak", "payload", unknowns=34)
+    rivals = chosen, *(scored(0.60, -500.0, "leak", other, unknowns=34) for other in ("cg_shift", "dead_volume"))
+    found = judge(refit, rivals, chosen, CONSTANTS, HeldOutGaps(20.0, 1.4), evidence(chosen, 1.0, 0.1, 0.1))
+    assert found.effects["payload", "front"] < 0.5 < 0.9 < found.effects["leak", "front"]
+    assert found.verdict == "leak" and found.probability > 0.9
+    alone = scored(0.60, -500.0, "payload", unknowns=32)
+    rivals = alone, *(scored(0.60, -500.0, other, unknowns=32) for other in ("cg_shift", "dead_volume"))
+    found = judge(refit, rivals, alone, CONSTANTS, HeldOutGaps(20.0, 1.4), evidence(alone, 1.0, 0.1, 0.1))
+    assert found.verdict == "payload" and found.probability < 0.5
+
+
 def test_how_many_effects_is_judged_by_the_cost() -> None:
     """A second effect that only one of six sensors sees lowers the mean a little and the cost by far: it stands."""
     refit, one = scored(800.0, 4000.0), scored(1.6, -100.0, "leak", unknowns=40)
