@@ -95,7 +95,7 @@ class Rig:
     pressure_noise: Quantity
     length_scale: Quantity = Quantity(5.0, 0.0, "1")
     model_form: Quantity = Quantity(0.0, 0.0, "1")
-    end_difference: Quantity = Quantity(0.2, 0.0, "1")
+    end_difference: Quantity = Quantity(OPTIONAL["end_difference"], 0.0, "1")
     ends: tuple[tuple[str, float], ...] = ()
     effects: tuple[NamedEffect, ...] = ()
     assumed: tuple[str, ...] = field(default=(), compare=False)

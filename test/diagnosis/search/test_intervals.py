@@ -66,6 +66,16 @@ def test_the_interval_is_found_beside_something_larger() -> None:
     assert abs(late - round(late)) < 0.15
 
 
+@pytest.mark.parametrize(("interval", "phase"), [(0.0713, 0.3), (0.095, 0.45)])
+def test_a_scan_ends_within_a_twentieth_of_an_interval(interval: float, phase: float) -> None:
+    """Phases are scanned by eighths; begun that far off, a fit stays there."""
+    driver = tuple({"taken": 1.0, "interval": interval, "phase": phase}.get(p.name, 0.0) for p in SHAPE.parameters)
+    found = values_of(scanned(problem_of(replace(TAKEN, values=driver)))["transport_delay.shape", "front"])
+    middle = 0.5 * SECONDS
+    late = (middle / found["interval"] - found["phase"]) - (middle / interval - phase)
+    assert abs(late - round(late)) < 0.05
+
+
 def test_a_valve_that_lags_is_no_driver_though_one_is_scanned_for() -> None:
     problem = problem_of(BESIDE)
     search = compete(problem, Effort(singles=4, finalists=2), False, lambda share, what: None)

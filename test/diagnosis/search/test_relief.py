@@ -53,8 +53,7 @@ def test_a_load_that_tolerances_answer_for_is_found() -> None:
     assert values[[p.name for p in parameters].index("payload")] == pytest.approx(LOAD, rel=0.4)
 
 
-def test_what_stood_in_for_a_load_goes_once_the_load_is_there() -> None:
-    """A shift of the centre of mass, in a structure that has a load for it."""
+def test_a_load_that_stood_in_for_a_shift_goes_once_the_shift_is_there() -> None:
     search, _ = search_of(SLOW, Active("cg_shift", "", (0.006,)))
     problem = search.problem
     wrong = Candidate(((SLOW.effect, SLOW.site), ("payload", "")))
