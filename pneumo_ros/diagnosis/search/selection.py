@@ -254,11 +254,13 @@ def relieved(poorer: Scored, richer: Scored, limits: Thresholds) -> bool:
     """Whether a further effect lets strained tolerances come back by so much that it is there, whatever is left.
 
     What changes the rig's own numbers, a load, tolerances may answer for wholly: then nothing is left to show it, but
-    they are farther from what the maker states than chance takes them. What it costs otherwise counts against it.
+    they are farther from what the maker states than chance takes them. What it costs otherwise counts against it. Of
+    several effects more each must bring as much, or one that brings nothing would come along.
     """
+    wanted = limits.relief * max(1, richer.size - poorer.size)
     relief = poorer.stretch - richer.stretch
     paid = poorer.price - richer.price
-    return min(relief, paid + PARAMETER_PENALTY) > limits.relief and richer.level < (1.0 + SAME) * poorer.level
+    return min(relief, paid + PARAMETER_PENALTY) > wanted and richer.level < (1.0 + SAME) * poorer.level
 
 
 def standard_error(one: Scored, other: Scored) -> float:

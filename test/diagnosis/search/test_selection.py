@@ -72,3 +72,13 @@ def test_both_ends_are_claimed_only_where_both_were_seen() -> None:
     for cost, site in ((-780.0, "rear"), (-790.0, "both")):
         both = scored(0.25, cost, "bump_stop", site="both")
         assert select(refit, [both, rear], LIMITS).fit.candidate.parts == (("bump_stop", site),)
+
+
+@pytest.mark.parametrize("relief, taken", [(10.0, False), (19.0, True)])
+def test_two_effects_more_must_relieve_the_tolerances_twice_as_much(relief: float, taken: bool) -> None:
+    """A load that lets them come back by ten brought a leak along that served the misfit of the first law alone."""
+    refit, one = scored(140.0, 9000.0), replace(scored(0.31, -800.0, "orifice_coefficient"), stretch=20.0)
+    three = replace(scored(0.30, -850.0, "orifice_coefficient", "payload", "leak"), stretch=20.0 - relief)
+    assert select(refit, [one, three], LIMITS) is (three if taken else one)
+    two = replace(scored(0.30, -850.0, "orifice_coefficient", "payload"), stretch=20.0 - relief)
+    assert select(refit, [one, two, three], LIMITS) is two
