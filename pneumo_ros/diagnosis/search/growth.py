@@ -94,8 +94,10 @@ def grow(search: Search, limits: Thresholds, further: bool = True) -> None:
         refined = _selected(search, limits)
         if further and refined.fit is not best.fit and _much_left(search, refined) and room_for_more(search):
             _climb(search, refined, max(limits.second_cost, limits.second_share * best.samples))
-        _end(search, _selected(search, limits))
-    best = _selected(search, limits)
+        best = _selected(search, limits)
+    if best.size:
+        _end(search, best)
+        best = _selected(search, limits)
     sharper = sharpened(search.problem, best.fit, search.effort.long)
     sharper = sharpened_bands(search.problem, sharper, search.effort.long)
     if sharper is not best.fit:
@@ -334,7 +336,7 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
 
 
 def _end(search: Search, best: Scored) -> None:
-    """Fit to convergence the likeliest structures with as many effects as ``best``, where their weights are close.
+    """Fit to convergence the likeliest structures with as many effects as ``best``, where others' weights are close.
 
     Short fits end at different depths, and that difference must not decide between families."""
     problem = search.problem
@@ -342,10 +344,11 @@ def _end(search: Search, best: Scored) -> None:
     groups = by_families([one for one in scored if one.size == best.size]).values()
     refit = score(problem, search.refit)
     leading = sorted((group[0] for group in groups), key=lambda one: -log_weight(one, refit))[:ENDED]
-    for one in leading:
-        if len(leading) > 1 and log_weight(one, refit) > log_weight(leading[0], refit) - CLOSE:
-            old = one.fit
-            search.structures.append(fit(problem, old.candidate, old.x, old.jacobian, iterations=search.effort.long))
+    close = [one.fit for one in leading if log_weight(one, refit) > log_weight(leading[0], refit) - CLOSE]
+    if len(close) > 1:
+        search.structures += problem.each(
+            lambda one: fit(problem, one.candidate, one.x, one.jacobian, iterations=search.effort.long), close
+        )
 
 
 def _without_idle_shapes(search: Search, found: Fit) -> Fit:
