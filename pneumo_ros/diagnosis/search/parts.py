@@ -9,18 +9,19 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.arrays import Mask
+from pneumo_ros.arrays import Array, Mask
 from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted, restricted_sensitivities
-from pneumo_ros.diagnosis.search.screening import CandidateScore, candidate_scores, trials
+from pneumo_ros.diagnosis.search.screening import SMALL, CandidateScore, candidate_scores, trials
 from pneumo_ros.diagnosis.search.selection import FORM, score
 from pneumo_ros.diagnosis.traits import BeginsAlone
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
 SHAPE_STEPS: Final = 5  # iterations of a fit with shapes, from its laws' end [numerics]
 STEPS: Final = 5  # iterations of a fit without some parts [numerics]
+ALL: Final = 2.0  # times a start's amplitude: what is bounded below is a share of something, and not sized [numerics]
 
 
 def with_shapes(problem: Problem, one: Fit, iterations: int = SHAPE_STEPS) -> Fit:
@@ -52,7 +53,7 @@ def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: in
     for part in parts:
         values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
     alone = [(part, own) for part in parts for own in _begins(problem, part)]
-    starts = [values, *(shape_alone(problem, one, part, own, parts, values) for part, own in alone)]
+    starts = [values, *(_sized(problem, one, part, own, parts, values) for part, own in alone)]
 
     def fitted(values: Sequence[float]) -> Fit:
         start = problem.start(candidate, one.x[: problem.fixed], values)
@@ -68,7 +69,7 @@ def begun(problem: Problem, one: Fit, law: Part, iterations: int) -> Fit:
     """
     shapes = [part for part in of_law(one.candidate, law) if part != law]
     values = problem.values(one.candidate, one.x).tolist()
-    starts = [shape_alone(problem, one, part, own, (), values) for part in shapes for own in _begins(problem, part)]
+    starts = [_sized(problem, one, part, own, (), values) for part in shapes for own in _begins(problem, part)]
     own = (one.candidate.parts.index(part) for part in (law, *shapes))
     before = Candidate(one.candidate.parts[: min(own)])
     shared = problem.fixed + len(problem.effect_parameters(before))  # columns that do not begin elsewhere
@@ -135,6 +136,31 @@ def shape_alone(problem: Problem, one: Fit, shape: Part, own: Sequence[float], p
             out[first : first + count] = [0.0 if p.size else v for p, v in before]
         first += count
     return out
+
+
+def _sized(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts: Sequence[Part],
+           values: Sequence[float]) -> list[float]:  # fmt: skip
+    """:func:`shape_alone` with the shape's amplitudes such that it does as much as what it stands for: a leak may be of
+    any size. A share that one is all of stays.
+    """
+    parameters = problem.parameters_of[shape]
+    if not any(p.size and 0.0 < ALL * value < p.high for p, value in zip(parameters, own, strict=True)):
+        return shape_alone(problem, one, shape, own, parts, values)
+
+    def times(size: float) -> list[float]:
+        scaled = [v * size if p.size else v for p, v in zip(parameters, own, strict=True)]
+        return shape_alone(problem, one, shape, scaled, parts, values)
+
+    def left(size: float) -> Array:
+        candidate = Candidate((*one.candidate.parts, *parts))
+        x = problem.start(candidate, one.x[: problem.fixed], times(size))
+        return problem.residual(candidate, x)[problem.fitted]
+
+    without = left(0.0)
+    change = without - left(1.0)
+    if not np.all(np.isfinite(change)) or not np.any(change):
+        return times(1.0)
+    return times(max(float(np.sum(without * change) / np.sum(change**2)), SMALL))
 
 
 def _most_promising(problem: Problem, one: Fit, part: Part) -> list[float]:

@@ -12,6 +12,7 @@ Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from numba import njit
 
@@ -27,6 +28,7 @@ from pneumo_ros.plant.air_spring import MEAN_AREA
 from pneumo_ros.units import ATMOSPHERE, GAS_CONSTANT, INCH
 
 OPENING = 5e4  # Pa above the opening at which a leak that opens has its area
+GAUGE = REFERENCE / (REFERENCE - ATMOSPHERE)  # over a hole's flow at the reference, where both pass the same
 USUAL = 1e-3  # kg/s, a valve's usual flow
 MIDDLE = 1.8 * INCH  # m
 SWING = 5e-3  # m
@@ -63,6 +65,8 @@ ATOMS: tuple[Atom | EffectParameter, ...] = (
     *(Atom(f"inlet past {ratio:g}", "1", 0.05, signed=True) for ratio in KNEES),
     Atom("chamber", "m3", 3e-5),
     EffectParameter("fills in", "s", QUICKEST, 1.0, 0.03, starts=(0.008, 0.2), spread=10.0),
+    # What lies between a gap and a hole, a capillary before an orifice, grows ever less: no sum of the two does.
+    Atom("leak over gauge pressure", "m2", 2e-7),
 )
 State = tuple[float, float, float, float, float, float, float, float]
 Values = tuple[float, ...]
@@ -103,6 +107,7 @@ def air(air: Air, z: State, p: Values) -> float:
     gap = gap_over_hole(air.pressure, ATMOSPHERE, LAMINAR) * cold
     leak = p[0] + p[1] * gap
     leak += p[2] * relieved(air.pressure, (1.0 + p[3]) * z[6]) / OPENING
+    leak += p[29] * GAUGE * (1.0 - ATMOSPHERE / air.pressure)
     flow = air.inflow * (p[4] + p[5] * (ratio - 0.5) + p[6] * (air.inflow / USUAL - 1.0))
     past, beyond = max(ratio - KNEES[0], 0.0) / BENT, max(ratio - KNEES[1], 0.0) / BENT
     flow += air.inflow * (p[25] * past * past + p[26] * beyond * beyond)
@@ -124,7 +129,15 @@ def air(air: Air, z: State, p: Values) -> float:
 AIR = Term("air", PlantTerm(states=8, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
     # Holes and gaps are the law's; an area that the two share is no size to tell.
-    AIR.shape("leak", ["leak that opens", "opens"], "a leak that opens", alone=("leak that opens",)),
+    replace(
+        AIR.shape(
+            "leak",
+            ["leak that opens", "opens", "leak over gauge pressure"],
+            "a leak that opens, or one through a fitting",
+            alone=("leak that opens",),
+        ),
+        begins=((0.0, 0.02, 2e-7),),  # from a hole and a gap small steps do not lead to what is neither
+    ),
     AIR.shape("orifice_coefficient", ["inlet", "outlet"], "orifices that pass another share of the flow, of any law"),
     AIR.shape(
         "heat_transfer",

@@ -11,10 +11,11 @@ from helpers.own_logs import driven
 from helpers.rig_logs import excitation, signals_of
 
 from pneumo_ros.diagnosis.fit.problem import Candidate, Problem
-from pneumo_ros.diagnosis.fit.solver import fit
+from pneumo_ros.diagnosis.fit.solver import Fit, fit
 from pneumo_ros.diagnosis.search.growth import _begun_anew
 from pneumo_ros.diagnosis.search.parts import begun, with_shapes
 from pneumo_ros.diagnosis.search.state import Effort, Search
+from pneumo_ros.effects.contract import Effect
 from pneumo_ros.effects.parameters import Active
 from pneumo_ros.effects.rig_model import RigModel
 from pneumo_ros.plant.trim import trim
@@ -76,3 +77,25 @@ def test_a_slow_part_is_begun_anew_beside_what_has_come_since() -> None:
     assert search.structures == [anew] and found.cost - anew.cost > 400.0
     slew = [p.name for p in problem.effect_parameters(grown)].index("slew")
     assert problem.values(grown, anew.x)[slew] == pytest.approx(LIMITED["slew"], rel=0.1)
+
+
+@pytest.mark.parametrize("area", [6e-8, 3e-7])
+def test_a_leak_through_a_fitting_is_begun_as_large_as_the_hole_that_stands_for_it(area: float) -> None:
+    """Its outlet's tolerance and the law's two numbers make a long valley of which few steps see the end."""
+    model = RigModel(load_rig())
+    shape = model.library["leak.shape"]
+    truth = tuple({"leak over gauge pressure": area}.get(p.name, 0.0) for p in shape.parameters)
+    road, commands = excitation(SECONDS, 4)
+    clean = model.simulate(driven(road, commands), None, trim(model.rig).state, (Active("leak.shape", "front", truth),))
+    record = signals_of(clean, road, commands, 4, "steps")
+    law = Candidate((("leak", "front"),))
+
+    def left(shape: Effect) -> Fit:
+        problem = Problem(RigModel(load_rig(), library={**model.library, "leak.shape": shape}), (record,))
+        typical = [p.typical for p in problem.effect_parameters(law)]
+        found = fit(problem, law, problem.start(law, None, typical), iterations=10)
+        return with_shapes(problem, found)
+
+    begun_alone = left(shape)
+    assert Problem(model, (record,)).values(begun_alone.candidate, begun_alone.x)[-1] == pytest.approx(area, rel=0.12)
+    assert begun_alone.cost < left(replace(shape, begins=())).cost - 25.0  # 288 and 33
