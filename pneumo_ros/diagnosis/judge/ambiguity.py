@@ -10,7 +10,7 @@ import numpy as np
 
 from pneumo_ros.diagnosis.fit.problem import Problem
 from pneumo_ros.diagnosis.judge.verdict import Opinion, name_of
-from pneumo_ros.diagnosis.search.selection import ALIKE, LAW_SHARE, Scored, standard_error
+from pneumo_ros.diagnosis.search.selection import Scored, alike, standard_error
 
 SAME: Final = 0.1  # relative difference of selection scores that is no difference [taste]
 POSSIBLE: Final = 0.05  # probability from which an effect is not excluded [taste]
@@ -56,7 +56,7 @@ def as_good(refit: Scored, chosen: Scored, rival: Scored) -> bool:
         (refit.fitted, chosen.fitted, rival.fitted),
         (refit.level, chosen.level, rival.level),
     ):
-        form = ALIKE + LAW_SHARE**2 * whole
+        form = alike(whole)
         if np.log((form + left) / (form + least)) > AS_GOOD or whole - left < MOST * (whole - least):
             return False
     return True

@@ -35,6 +35,8 @@ SAME: Final = 0.05  # relative difference of levels that counts as none, whateve
 # two families leave less, what is left does not tell them apart [calibration: set 0.4, opened]
 ALIKE: Final = 0.6
 LAW_SHARE: Final = 0.01  # of the refit's root mean square: what right laws leave [calibration: set 0.4, opened]
+# Of what the refit leaves, mean square: the most that a right law leaves, where all of it is little [taste]
+QUARTER: Final = 0.25
 # Log weight for a fall of one of the log mean square: as many samples' worth of evidence, however long the log, because
 # laws differ by more than chance does [calibration: development cases of 0.3]
 SHARPNESS: Final = 36.0
@@ -186,16 +188,21 @@ def noise_level(problem: Problem) -> float:
     return float(np.sum((problem.weight * problem.expected) ** 2) / max(1, there.sum()))
 
 
+def alike(whole: float) -> float:
+    """Mean square, sigma squared, that a law of the right kind may leave beside noise of what the refit leaves."""
+    return min(ALIKE, QUARTER * whole) + LAW_SHARE**2 * whole
+
+
 def log_weight(one: Scored, refit: Scored) -> float:
     """Of a structure among others with as many effects: what it leaves of fitted and kept samples, half and half, what
     it claims for that, and how unlikely the tolerances are that it needs.
 
-    What laws of the right kind leave (:data:`ALIKE`, :data:`LAW_SHARE`) is added to both levels: two families that both
-    leave less are told apart by what they need for it alone. The tolerances count in full, as the normal distributions
-    that the maker states, for no error of a law moves the rig's own numbers.
+    What laws of the right kind leave (:func:`alike`) is added to both levels: two families that both leave less are
+    told apart by what they need for it alone. The tolerances count in full, as the normal distributions that the maker
+    states, for no error of a law moves the rig's own numbers.
     """
     pairs = ((refit.fitted, one.fitted), (refit.level, one.level))
-    left = [float(np.log(ALIKE + LAW_SHARE**2 * whole + level)) for whole, level in pairs]
+    left = [float(np.log(alike(whole) + level)) for whole, level in pairs]
     return -SHARPNESS * (0.5 * sum(left) + one.strain / one.samples) - 0.5 * one.stretch - PER_UNKNOWN * one.claims
 
 

@@ -82,3 +82,13 @@ def test_two_effects_more_must_relieve_the_tolerances_twice_as_much(relief: floa
     assert select(refit, [one, three], LIMITS) is (three if taken else one)
     two = replace(scored(0.30, -850.0, "orifice_coefficient", "payload"), stretch=20.0 - relief)
     assert select(refit, [one, two, three], LIMITS) is two
+
+
+def test_where_the_refit_leaves_little_a_right_law_leaves_less() -> None:
+    """A leak of 1.2 noise floors: heat leaves a tenth of the misfit, far less than right laws leave of a large one."""
+    refit = replace(scored(0.417, -625.0), fitted=0.34)
+    leak = replace(scored(0.157, -973.0, "leak"), fitted=0.194, unknowns=2.0)
+    heat = replace(scored(0.184, -908.0, "heat_transfer"), fitted=0.216, unknowns=1.0)
+    assert log_weight(leak, refit) - log_weight(heat, refit) > 1.0
+    large = replace(refit, level=41.7, fitted=34.0)
+    assert abs(log_weight(leak, large) - log_weight(heat, large)) < 1.0
