@@ -27,6 +27,7 @@ from pneumo_ros.diagnosis.judge.idle_shapes import with_own_laws
 from pneumo_ros.diagnosis.judge.outcome import Outcome, Whereabouts
 from pneumo_ros.diagnosis.judge.pruning import harmful
 from pneumo_ros.diagnosis.judge.ranking import rank
+from pneumo_ros.diagnosis.judge.stated_otherwise import stated_otherwise
 from pneumo_ros.diagnosis.judge.verdict import Calibration, HeldOutGaps, Opinion, judge, name_of
 from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.record import Record
@@ -255,7 +256,7 @@ def _report(outcome: Outcome, opinion: Opinion, options: Options, tell: Progress
         not_testable=hidden,
         experiment=None if refused else experiment,
         edit=None if edit is None else edit_test(problem, edit, outcome.base, best),
-        notes=(*_notes(search, best, problem), *refused),
+        notes=(*_notes(search, best, problem), *stated_otherwise(problem, outcome.refit, outcome.chosen), *refused),
         logs={"fit": [r.name for r in problem.records], "holdout": holdout.name},
         tried=tuple((f.candidate.label, problem.gap(f.residual)) for f in [*search.singles, *search.pairs]),
         evidence=_evidence(outcome),

@@ -32,6 +32,7 @@ SHARED = ("bushing_damping", "effective_area_scale", "volume_scale", "discharge_
 # Beside them the slope of V(h): a common factor alone would make V/(dV/dh), the air's stiffness, exact.
 SLOPE = "volume_slope"
 SPLIT = "_split"
+UNLIKE = "where the two ends' parts are not alike, state end_difference: {value: 1, unit: '1'} in the rig file"
 
 
 @lru_cache(maxsize=32)
@@ -107,7 +108,9 @@ def nuisance_parameters(rig: Rig) -> tuple[Parameter, ...]:
         if q.std > 0.0:
             found.append(Parameter(name, q.unit, centre[name], q.std))
         if name in SHARED and q.value and share * q.std > 0.0:
-            found.append(Parameter(name + SPLIT, "1", centre[name + SPLIT], share * q.std / abs(q.value)))
+            std, known = share * q.std / abs(q.value), share < 1.0
+            found.append(Parameter(name + SPLIT, "1", centre[name + SPLIT], std, 1.0 / share if known else 1.0,
+                                   UNLIKE if known else ""))  # fmt: skip
     slope = SLOPE_SHARE * rig.volume_scale.std
     if slope > 0.0:  # no number of the rig's: what the springs' curves differ by is as open as what they have in common
         found += [Parameter(name, "1", centre[name], slope) for name in (SLOPE, SLOPE + SPLIT)]

@@ -16,12 +16,19 @@ class Parameter:
 
     ``std`` is one sigma of the prior in ``unit``; the fit stays inside ``nominal`` +-
     three sigma of it.
+
+    Attributes
+    ----------
+    loose : times ``std`` that it may be off by on a rig whose maker was wrong to be that sure
+    otherwise : what such a maker states instead, in words; '' where ``loose`` is 1
     """
 
     name: str
     unit: str
     nominal: float
     std: float
+    loose: float = 1.0
+    otherwise: str = ""
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,7 @@ class Problem:
     fold : which of every :data:`SELECT_EVERY` blocks is kept from the fit
     threads : simulations at a time; more than one pays where the model runs without the interpreter's lock
     tightness : times the weight that the tolerances of the nuisance parameters are told to have
+    loose : whether each may be off by its :attr:`~pneumo_ros.effects.parameters.Parameter.loose` tolerances
     scanned : start values, SI, of shapes that these logs were scanned for
         (:mod:`pneumo_ros.diagnosis.search.intervals`)
     """
@@ -84,6 +85,7 @@ class Problem:
     fold: int = SELECT_EVERY - 1
     threads: int = 1
     tightness: float = 1.0
+    loose: bool = False
     scanned: Mapping[Part, tuple[float, ...]] = field(default_factory=dict)
 
     def each(self, work: Callable[[Item], Done], items: Iterable[Item]) -> list[Done]:
@@ -227,7 +229,7 @@ class Problem:
         parameters = self.effect_parameters(candidate)
         count = len(self.model.parameters)
         free = np.full(self.fixed - count, np.inf)
-        reach = np.full(count, REACH)
+        reach = REACH * self._widths
         low = np.array([p.low / p.typical for p in parameters])
         high = np.array([p.high / p.typical for p in parameters])
         return np.concatenate([-reach, -free, low]), np.concatenate([reach, free, high])
@@ -237,7 +239,12 @@ class Problem:
         effects that of their spread."""
         own = [1.0 / p.spread**2 for p in self.effect_parameters(candidate)]
         count = len(self.model.parameters)
-        return np.concatenate([np.full(count, self.tightness), np.ones(self.fixed - count), own])
+        return np.concatenate([self.tightness / self._widths**2, np.ones(self.fixed - count), own])
+
+    @cached_property
+    def _widths(self) -> Array:
+        """Of the nuisance parameters' priors, in their tolerances."""
+        return np.array([p.loose if self.loose else 1.0 for p in self.model.parameters])
 
     def start(self, candidate: Candidate, fixed: Array | None, values: Sequence[float]) -> Array:
         """Scaled unknowns from the fixed part (None: nominal) and effect values (SI)."""
