@@ -236,10 +236,8 @@ def _rows(model: Running, record: Drive, nuisance: Array, active: Sequence[Activ
     every = max(1, round(THINNED / record.period))
     index = np.arange(0, min(len(states), len(inputs.commands)) - 1, every)
     end = 1 if site == "rear" else 0
-    rows = [
-        [_row(model, nuisance, active, states[i], inputs, int(i), e, record.period) for i in index]
-        for e in (end, 1 - end)
-    ]
+    plant = model.plant(nuisance, active)
+    rows = [[_row(model, plant, states[i], inputs, int(i), e, record.period) for i in index] for e in (end, 1 - end)]
     if total:  # a shared term sees what both ends draw
         rows[0] = [
             a._replace(air=a.air._replace(inflow=a.air.inflow + b.air.inflow)) for a, b in zip(*rows, strict=True)
@@ -248,11 +246,7 @@ def _rows(model: Running, record: Drive, nuisance: Array, active: Sequence[Activ
     return _Run(rows[0], rows[1], every * record.period)
 
 
-def _row(
-    model: Running, nuisance: Array, active: Sequence[Active], state: Array, inputs: Inputs, i: int, end: int,
-    period: float,
-) -> _Row:  # fmt: skip
-    plant = model.plant(nuisance, active)
+def _row(model: Running, plant: Plant, state: Array, inputs: Inputs, i: int, end: int, period: float) -> _Row:
     body, gas = plant.body, (plant.front, plant.rear)[end]
     arm = (body.front_arm, -body.rear_arm)[end]
     top, axle, pressure = state[0] + arm * state[1], state[2 + end], state[8 + end]
