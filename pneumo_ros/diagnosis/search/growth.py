@@ -358,7 +358,7 @@ def _without_idle_shapes(search: Search, found: Fit) -> Fit:
         if _does(problem, bare, found):
             return bare
     for part in found.candidate.shapes:
-        less = reduced(problem, found, (part,), iterations=STEPS)
+        less = reduced(problem, found, (part,), iterations=search.effort.long)  # the law takes back what it shared
         found = less if _does(problem, less, found) else found
     return found
 
