@@ -156,10 +156,10 @@ def _sized(problem: Problem, one: Fit, shape: Part, own: Sequence[float], parts:
         x = problem.start(candidate, one.x[: problem.fixed], times(size))
         return problem.residual(candidate, x)[problem.fitted]
 
-    without = left(0.0)
-    change = without - left(1.0)
-    if not np.all(np.isfinite(change)) or not np.any(change):
+    without, full = left(0.0), left(1.0)
+    if not (np.all(np.isfinite(without)) and np.all(np.isfinite(full))) or np.array_equal(without, full):
         return times(1.0)
+    change = without - full
     return times(max(float(np.sum(without * change) / np.sum(change**2)), SMALL))
 
 

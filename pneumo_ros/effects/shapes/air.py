@@ -128,7 +128,8 @@ def air(air: Air, z: State, p: Values) -> float:
 
 AIR = Term("air", PlantTerm(states=8, start=start, advance=advance, air=air), ATOMS, ENDS, ("{end}_air",))
 EFFECTS = (
-    # Holes and gaps are the law's; an area that the two share is no size to tell.
+    # Holes and gaps are the law's; an area that the two share is no size to tell. What passes in proportion to the
+    # gauge pressure shares it, too: the search takes the shape out where the law does as well.
     replace(
         AIR.shape(
             "leak",
