@@ -90,6 +90,8 @@ class Effect:
     taken : of a shape that may take its command at intervals, which of its parameters are the share that is taken so,
         the interval and the phase
     sticks : of a shape that may stick, which of its parameters are the share that does and the band
+    waves : of a shape that may have waves, which of its parameters are the sizes of the even and of the odd one and how
+        many there are a unit of its coordinate
     begins : of a shape, values of its parameters from which it is fitted as well, its family's laws at nothing: there
         it does all of their work, and small steps from these do not lead to it
     elsewhere : places, ``{end}`` as above, where the same motion may come from: its name is held against what may act
@@ -116,6 +118,7 @@ class Effect:
     screened: tuple[int, ...] = ()
     taken: tuple[int, ...] = ()
     sticks: tuple[int, int] | tuple[()] = ()
+    waves: tuple[int, int, int] | tuple[()] = ()
     begins: tuple[Values, ...] = ()
     elsewhere: tuple[str, ...] = ()
     always: bool = False

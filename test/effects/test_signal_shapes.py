@@ -10,7 +10,7 @@ from pneumo_ros.effects.contract import Ends, Inputs
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
 from pneumo_ros.effects.shapes import air
 from pneumo_ros.effects.shapes.families import SHAPES
-from pneumo_ros.effects.shapes.signals import CREEPS, EXCITER_LAGS
+from pneumo_ros.effects.shapes.signals import CORNERS, CREEPS, EXCITER_LAGS
 from pneumo_ros.plant.air_spring import MEAN_AREA
 from pneumo_ros.units import GAS_CONSTANT
 
@@ -53,6 +53,18 @@ def test_a_follower_has_a_lag_each_way_and_a_rate_limit() -> None:
     limited = road_after(step, 0.02, 1e-4, 1e-4)
     assert np.max(np.diff(limited)) == pytest.approx(0.02 * PERIOD)
     assert np.argmax(limited >= 0.0099) * PERIOD == pytest.approx(0.495, abs=2 * PERIOD)
+
+
+def test_any_corner_of_a_dead_zone_may_be_as_wide_as_the_widest() -> None:
+    """Of a narrow corner's zone 3.4 times is no limit that a valve has."""
+    shape = SHAPES["valve_deadband.shape"]
+    widest = [p.high * width for p, width in zip(shape.parameters, CORNERS, strict=False)]
+    assert widest == pytest.approx([2.0 * CORNERS[-1]] * len(CORNERS))
+    command, narrow = np.full((3, 4), 1e-6), CORNERS[0]
+    values = (3.4, *[0.0] * (len(shape.parameters) - 1))
+    assert shape.inputs is not None
+    passed = shape.inputs(Inputs(command, np.zeros((4, 2))), 2e-3, Ends(True, False), values, None)[0].commands
+    assert passed[:, 0] == pytest.approx(1e-6 - 3.4 * narrow)
 
 
 def test_a_spool_sticks_until_its_command_is_a_band_away_then_jumps_to_it() -> None:

@@ -78,6 +78,8 @@ class Calibration:
     slightly : share of what the refit leaves half way between these
     taken_back : told probability of an effect of the best structure that the held-out log takes back entirely, where
         something does act: more were right than wrong, but what is not named is not told as more likely than not
+    tied : where no effect is likelier than not, the share of the likeliest one's probability that one must exceed to
+        be told beside it
     """
 
     first_penalty: float = 9.0
@@ -104,6 +106,7 @@ class Calibration:
     right_if_slight: float = 0.9
     slightly: float = 0.1
     taken_back: float = 0.5
+    tied: float = 0.75
 
 
 @dataclass(frozen=True)
@@ -208,8 +211,8 @@ def judge(
                                          acts * min(1.0, one.instead), calibration) for one in evidence}  # fmt: skip
     stands = {law for law, value in trust.items() if value > 0.5}
     # What is no likelier than not stands only where nothing else does: between names that are as good, one is told.
-    likelier = {law for law in stands if effects[law] > 0.5}
-    names = sorted({family_of(law[0]) for law in likelier or stands})
+    least = min(0.5, calibration.tied * max((effects[law] for law in stands), default=0.0))
+    names = sorted({family_of(law[0]) for law in stands if effects[law] > least})
     nameless = "unknown" if unknown >= scaled[refit.fit.candidate] else "none"
     return Opinion(chosen, "+".join(names) or nameless, scaled, unknown, effects)
 

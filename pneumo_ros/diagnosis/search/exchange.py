@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from pneumo_ros.diagnosis.fit.problem import Part
-from pneumo_ros.diagnosis.fit.solver import Fit, refreshed
+from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
+from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.fitting import (
+    PROBE,
     of_law,
     probed,
     probed_one,
@@ -26,6 +27,7 @@ FEW: Final = 3  # iterations of a structure without one of its effects [numerics
 FOR_EACH: Final = 4  # exchanges screened for each effect that may be probed [numerics]
 PROBED: Final = 8  # exchanges probed, of all effects together [numerics]
 TINY: Final = 1e-6  # of the misfit: what a share leaves at least [numerics]
+BOTH: Final = "both"  # site of an effect at both ends [definition]
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 
 
@@ -98,6 +100,41 @@ def _best_exchange(search: Search, found: Fit) -> Fit | None:
     _, entry, bare = min(probes, key=lambda item: item[0])
     short = short_fits(search, bare, [entry], (0.86, 0.86))
     return with_all_shapes(problem, short[0], search.effort.short) if short else None
+
+
+def widened(search: Search, found: Fit) -> Fit | None:
+    """The structure with one of its effects at both ends, as it was found at one; None where none may be.
+
+    A law at both ends is compared with the same law at one where both are screened; what its shape has become since
+    is not seen there. A few cheap steps of each, and the best is fitted.
+    """
+    problem, whole = search.problem, fresh(search, found)
+    families = [family_of(name) for name, _ in found.candidate.laws]
+    alone = [law for law in found.candidate.laws if families.count(family_of(law[0])) == 1]
+
+    def probe(law: Part) -> Fit:
+        own = of_law(found.candidate, law)
+        first = min(map(found.candidate.parts.index, own))
+        candidate = Candidate(tuple((part[0], BOTH) if part in own else part for part in found.candidate.parts))
+        before = problem.effect_parameters(Candidate(found.candidate.parts[:first]))
+        return fit(problem, candidate, whole.x, whole.jacobian, iterations=PROBE, probe=True,
+                   shared=problem.fixed + len(before))  # fmt: skip
+
+    probes = problem.each(probe, [law for law in alone if _may_widen(problem, law)])
+    best = min(probes, key=lambda one: one.cost, default=None)
+    if best is None or best.diverged or best.cost > found.cost:
+        return None
+    return fit(problem, best.candidate, best.x, None, iterations=search.effort.short)
+
+
+def _may_widen(problem: Problem, law: Part) -> bool:
+    """Whether a law that acts at one end may act at both with the same parameters."""
+    effect = problem.model.effects[law[0]]
+    return (
+        law[1] != BOTH
+        and BOTH in effect.sites
+        and len(problem.parameters_of[law]) == len(problem.parameters_of[law[0], BOTH])
+    )
 
 
 def exchanged_in_place(search: Search, found: Fit, bare: Fit, law: Part) -> Fit:

@@ -17,7 +17,7 @@ from pneumo_ros.diagnosis.fit.problem import Candidate, Part, Problem
 from pneumo_ros.diagnosis.fit.solver import Fit, fit, refreshed
 from pneumo_ros.diagnosis.search.bands import sharpened_bands, with_bands
 from pneumo_ros.diagnosis.search.competition import room_for_more
-from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, fresh, one_exchanged, without
+from pneumo_ros.diagnosis.search.exchange import exchanged_in_place, fresh, one_exchanged, widened, without
 from pneumo_ros.diagnosis.search.fitting import by_cost, of_law, probed, ranked, short_fits, varied
 from pneumo_ros.diagnosis.search.intervals import intervals, shapes_that_take, sharpened, taken_at
 from pneumo_ros.diagnosis.search.parts import STEPS, begun, reduced, shaped, with_all_shapes, with_own_shape
@@ -149,6 +149,10 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
         search.progress(0.84 + 0.05 * number / ROUNDS, f"beside {current.candidate.label}")
         if _much_left(search, score(problem, current)):
             current = _begun_anew(search, current)
+            wide = widened(search, current)
+            if wide is not None and price(wide) < price(current) - worth:
+                search.structures.append(wide)
+                current = wide
         while exchanges and _much_left(search, score(problem, current)):
             other = one_exchanged(search, current)
             exchanges -= 1
@@ -338,7 +342,8 @@ def _refine(search: Search, best: Scored, limits: Thresholds) -> None:
 def _end(search: Search, best: Scored) -> None:
     """Fit to convergence the likeliest structures with as many effects as ``best``, where others' weights are close.
 
-    Short fits end at different depths, and that difference must not decide between families."""
+    Short fits end at different depths, and that difference must not decide between families; no more may an end at
+    which one of them was not tried."""
     problem = search.problem
     scored = [score(problem, one) for one in search.finalists]
     groups = by_families([one for one in scored if one.size == best.size]).values()
@@ -346,9 +351,11 @@ def _end(search: Search, best: Scored) -> None:
     leading = sorted((group[0] for group in groups), key=lambda one: -log_weight(one, refit))[:ENDED]
     close = [one.fit for one in leading if log_weight(one, refit) > log_weight(leading[0], refit) - CLOSE]
     if len(close) > 1:
-        search.structures += problem.each(
+        ended = problem.each(
             lambda one: fit(problem, one.candidate, one.x, one.jacobian, iterations=search.effort.long), close
         )
+        wide = [widened(search, one) for one in ended] if best.size > 1 else []
+        search.structures += [*ended, *(one for one in wide if one is not None)]
 
 
 def _without_idle_shapes(search: Search, found: Fit) -> Fit:

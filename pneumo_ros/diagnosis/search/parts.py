@@ -16,6 +16,7 @@ from pneumo_ros.diagnosis.model import Model
 from pneumo_ros.diagnosis.search.fitting import PROBE, of_law, restricted, restricted_sensitivities
 from pneumo_ros.diagnosis.search.screening import SMALL, CandidateScore, candidate_scores, trials
 from pneumo_ros.diagnosis.search.selection import FORM, score
+from pneumo_ros.diagnosis.search.waves import begun_waves
 from pneumo_ros.diagnosis.traits import BeginsAlone
 from pneumo_ros.effects.parameters import SHAPE, Active, family_of
 
@@ -46,12 +47,15 @@ def shapes_of(model: Model, candidate: Candidate) -> tuple[Part, ...]:
 
 def with_parts(problem: Problem, one: Fit, parts: Sequence[Part], iterations: int, rows: Mask | None = None) -> Fit:
     """A structure with further parts, which start at nothing; what is no size and has further starts (a frequency)
-    starts at the one that promises most. A shape that may do its laws' work alone is also fitted from there.
+    starts at the one that promises most, and so do waves. A shape that may do its laws' work alone is also fitted
+    from there.
     """
     candidate = Candidate((*one.candidate.parts, *parts))
     values = problem.values(one.candidate, one.x).tolist()
     for part in parts:
-        values += _most_promising(problem, one, part) or _beginnings(problem, one, part)
+        values += (
+            begun_waves(problem, one, part) or _most_promising(problem, one, part) or _beginnings(problem, one, part)
+        )
     alone = [(part, own) for part in parts for own in _begins(problem, part)]
     starts = [values, *(_sized(problem, one, part, own, parts, values) for part, own in alone)]
 

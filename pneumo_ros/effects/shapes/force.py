@@ -11,11 +11,15 @@ Kernel arguments: :class:`pneumo_ros.effects.composition.PlantTerm`.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 from numba import njit
 
 from pneumo_ros.effects.composition import PlantTerm
 from pneumo_ros.effects.contract import ENDS
 from pneumo_ros.effects.hooks import Air, Strut, Tyre
+from pneumo_ros.effects.parameters import EffectParameter
 from pneumo_ros.effects.shapes.atoms import Atom, Term
 from pneumo_ros.laws.friction import clipped, slid
 from pneumo_ros.laws.memory import relaxed
@@ -32,6 +36,7 @@ MIDDLE = 1.8 * INCH  # m, design height
 SWING = 5e-3  # m, travel of a session
 GAUGE = 2.5e5  # Pa, between the two ends' static pressures
 TOUCHING = 1e-3  # m over which a stop's damping sets in
+WAVES = 120.0  # a metre, lobes of a convoluted bellows that the area follows
 # Turned over, because a compiled division by a constant takes as long as five products: with the terms inlined, whose
 # forty amplitudes a call would copy, the half of what these atoms cost a step.
 PER_RATE, PER_SLACK = tuple(1.0 / r for r in RATES), tuple(1.0 / s for s in SLACKS)
@@ -39,7 +44,7 @@ PER_SWING, PER_GAUGE, PER_TOUCHING = 1.0 / SWING, 1.0 / GAUGE, 1.0 / TOUCHING
 
 State = tuple[float, float, float, float, float, float, float, float]
 
-ATOMS = (
+ATOMS: tuple[Atom | EffectParameter, ...] = (
     *(Atom(f"friction_out {r:g} m/s", "N", 3.0) for r in RATES),
     Atom("damping_out", "N s/m", 20.0),
     Atom("damping_out squared", "N s2/m2", 60.0),
@@ -62,6 +67,10 @@ ATOMS = (
     Atom("constant", "N", 2.0, signed=True),
     *(Atom(f"deep slider {s:g} m", "N", 3.0) for s in SLACKS[2:4]),
     Atom("area pressure squared", "1", 0.02, signed=True),
+    Atom("area wave even", "1", 0.02, signed=True),
+    Atom("area wave odd", "1", 0.02, signed=True),
+    # Nothing where whatever may act there is fitted: its waves have the usual length.
+    EffectParameter("area waves", "1/m", 70.0, 200.0, WAVES, spread=10.0),
 )
 Values = tuple[float, ...]
 
@@ -107,6 +116,9 @@ def force(strut: Strut, z: State, p: Values) -> float:
         out -= p[25] * (h - STRAPS[0]) + p[26] * max(0.0, h - STRAPS[1]) + p[27] * max(0.0, h - STRAPS[2])
     x, over = (h - MIDDLE) * PER_SWING, load - 1.0
     out += strut.gauge * strut.area * (p[31] + p[32] * x + p[33] * x * x + p[34] * over + p[43] * over * over)
+    if p[44] != 0.0 or p[45] != 0.0:
+        turn = 2.0 * math.pi * (p[46] if p[46] > 0.0 else WAVES) * (h - MIDDLE)
+        out += strut.gauge * strut.area * (p[44] * math.cos(turn) + p[45] * math.sin(turn))
     out += p[35] * (h - MIDDLE) + p[36] * x * abs(x)
     out -= max(0.0, 1.0 - x) * (p[41] * z[2] + p[42] * z[3])
     return out - p[37] * (h - z[5]) - p[38] * (h - z[6]) - p[39] * (h - z[7])
@@ -132,6 +144,9 @@ EFFECTS = (
         "hysteresis of any law: sliders of every length, some of which hold the better the deeper the spring is",
     ),
     FORCE.shape("bump_stop", ["stop", "touch", "touch_in"], "a stop of any law: begins below a height and may damp"),
-    FORCE.shape("effective_area_error", ["area"], "an area error of any law over height and pressure"),
+    replace(
+        FORCE.shape("effective_area_error", ["area"], "an area error of any law over height and pressure, or in waves"),
+        waves=(5, 6, 7),
+    ),
     FORCE.anything(),
 )  # fmt: skip

@@ -43,6 +43,7 @@ SENSOR_LAGS = (0.002, 0.006, 0.02, 0.06)  # s
 WAYS = ("rising", "falling")
 UNEVEN = (0.008, 0.03)  # s, lags one way of a valve that is quick the other way
 QUICK = 0.001  # s
+TWICE = 2.0  # of a filter's share: what is more is no part of a signal
 SHARE = 0.3
 BEGINS = ((0.05, 0.005), (0.005, 0.05))  # s, lags up and down from which a follower that does all of it is fitted
 LIMITS = (0.5, 1.5)  # of the typical rate limit, the same with lags of LIMITED s
@@ -110,17 +111,21 @@ def mixed(filters: Sequence[Filter], u: Array, period: float, shares: Values, me
     return out, tuple(kept)
 
 
-def _shares(names: Sequence[str], every_sign: bool = False) -> tuple[EffectParameter, ...]:
-    low = -2.0 if every_sign else 0.0
-    return tuple(EffectParameter(n, "1", low, 2.0, SHARE, size=True, spread=10.0) for n in names)
+def _shares(names: Sequence[str], every_sign: bool = False, most: Sequence[float] = ()) -> tuple[EffectParameter, ...]:
+    """Shares by name, at most ``most``, or twice the whole."""
+    highs = most or [TWICE] * len(names)
+    return tuple(
+        EffectParameter(n, "1", -high if every_sign else 0.0, high, SHARE, size=True, spread=10.0)
+        for n, high in zip(names, highs, strict=True)
+    )
 
 
 def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filter], inlets_only: bool,
            fitted: tuple[EffectParameter, ...] = (), made: Callable[..., Filter] | None = None,
-           alone: bool = False, taken: bool = False) -> Effect:  # fmt: skip
-    """A valve's shape; one filter whose numbers are fitted is ``made`` of the last parameters, after its share, and
-    tried ``alone`` as well, or scanned for where these are an interval and a phase (``taken``); a follower is begun
-    with as all of it.
+           alone: bool = False, taken: bool = False, most: Sequence[float] = ()) -> Effect:  # fmt: skip
+    """A valve's shape of filters, each with ``most`` as its largest share; one filter whose numbers are fitted is
+    ``made`` of the last parameters, after its share, and tried ``alone`` as well, or scanned for where these are an
+    interval and a phase (``taken``); a follower is begun with as all of it.
     """
 
     def inputs(given: Inputs, period: float, ends: Ends, values: Values, memory: Memory) -> tuple[Inputs, Memory]:
@@ -132,7 +137,7 @@ def _valve(name: str, summary: str, names: Sequence[str], filters: Sequence[Filt
         )
         return given._replace(commands=np.maximum(commands, 0.0)), memory
 
-    parameters = (*_shares(names, name.startswith("anything")), *fitted)
+    parameters = (*_shares(names, name.startswith("anything"), most), *fitted)
     screened = (len(names),) if alone else ()
     sticks = (len(names), len(names) + 1) if made is _stick else ()
     at = (len(names), len(names) + 1, len(names) + 2) if taken else ()
@@ -250,6 +255,8 @@ UNEVEN_NAMES = [f"slow {way} {t:g} s" for t in UNEVEN for way in ("opening", "cl
 ONE_WAY = [_follow(math.inf, *pair) for t in UNEVEN for pair in ((t, QUICK), (QUICK, t))]
 ZONE_NAMES = [*(f"corner {c:g} m2" for c in CORNERS), *(f"play {c:g} m2" for c in PLAYS)]
 SLOW, LATE = [_lag(t) for t in VALVE_LAGS], [_delay(t) for t in DELAYS]
+# Of two shares of a narrow corner's zone one of twice its width is made: each may be as wide as the widest.
+ZONE_SHARES = [*(TWICE * CORNERS[-1] / c for c in CORNERS), *([TWICE] * len(PLAYS))]
 ZONES = [*(_corner(c) for c in CORNERS), *(_play(c) for c in PLAYS)]
 STICKING = (*_shares(["sticking"]),
             EffectParameter("band", "m2", 3e-9, 1e-6, 1.2e-7, starts=(4e-8, 2.5e-7)))  # fmt: skip
@@ -264,7 +271,7 @@ EFFECTS = (
     _valve("transport_delay.shape", "commands that come late by delays of many lengths, or at a driver's intervals",
            DELAY_NAMES, LATE, False, TAKING, _take, taken=True),
     _valve("valve_deadband.shape", "a dead zone of any law: hard, soft, with play, or a spool that sticks and jumps",
-           ZONE_NAMES, ZONES, True, STICKING, _stick, alone=True),
+           ZONE_NAMES, ZONES, True, STICKING, _stick, alone=True, most=ZONE_SHARES),
     _valve("anything.valve", "whatever acts there", [*LAG_NAMES, *DELAY_NAMES, *ZONE_NAMES], [*SLOW, *LATE, *ZONES],
            True),
     Effect("exciter_lag.shape", "a slow exciter of any law", ENDS, ("road_input",), EXCITER, inputs=_exciter,

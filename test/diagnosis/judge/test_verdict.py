@@ -85,6 +85,20 @@ def test_what_is_no_likelier_than_not_is_left_out_beside_what_is() -> None:
     assert found.verdict == "payload" and found.probability < 0.5
 
 
+def test_where_none_is_likelier_than_not_one_far_behind_the_likeliest_is_left_out() -> None:
+    """In the stead of a load that no rival structure holds something elsewhere leaves a fifth of what this one does."""
+    refit, chosen = scored(400.0, 3000.0), scored(0.60, -500.0, "leak", "payload", unknowns=34)
+    others = [("cg_shift", "dead_volume"), ("cg_shift", "tyre_damping"), ("tyre_damping", "dead_volume")]
+    rivals = chosen, *(scored(0.60, -500.0, *two, unknowns=34) for two in others)
+    leak, payload = evidence(chosen, 1.0, 0.1, 0.1)
+    seen = [leak, replace(payload, instead=0.2)]
+    found = judge(refit, rivals, chosen, CONSTANTS, HeldOutGaps(20.0, 1.4), seen)
+    assert found.effects["payload", "front"] < 0.3 < found.effects["leak", "front"] < 0.5
+    assert found.verdict == "leak"
+    tie = judge(refit, rivals, chosen, CONSTANTS, HeldOutGaps(20.0, 1.4), [leak, payload])
+    assert tie.verdict == "leak+payload"
+
+
 def test_how_many_effects_is_judged_by_the_cost() -> None:
     """A second effect that only one of six sensors sees lowers the mean a little and the cost by far: it stands."""
     refit, one = scored(800.0, 4000.0), scored(1.6, -100.0, "leak", unknowns=40)
