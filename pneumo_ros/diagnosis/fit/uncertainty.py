@@ -132,9 +132,9 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
     The first sum is of sizes and of shape parameters of laws. A size at its bound counts 1 (nothing real is so large),
     and so does a shape parameter at a bound where another family begins; all other shape parameters of a law count
     0.5 together, because another law of the family may need them there. Where the family's flexible shape stands
-    beside the law, a size counts 0.5 and the law's shape parameters nothing, for the flexible shape can do the same;
-    but not what lies beyond the border to another family, so that one at such a border counts as without it. The
-    second sum is of the parameters of flexible shapes that are no sizes, 0.5 each.
+    beside the law, a size of either counts 0.5 and the law's shape parameters nothing, for the law and the shape's
+    other atoms can do the same; but not what lies beyond the border to another family, so that one at such a border
+    counts as without it. The second sum is of the parameters of flexible shapes that are no sizes, 0.5 each.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def at_bounds(problem: Problem, fit: Fit, parts: Sequence[Part] | None = None) -
         crossed = sum(_crosses(p, value) for p, value in stuck)
         sizes = sum(p.size and not _crosses(p, value) for p, value in stuck)
         shaping = len(stuck) - crossed - sizes
-        firm += crossed + sizes * (0.5 if beside else 1.0) + (0.5 if law and not beside and shaping else 0.0)
+        firm += crossed + sizes * (0.5 if beside or not law else 1.0) + (0.5 if law and not beside and shaping else 0.0)
         bent += 0.0 if law else 0.5 * shaping
     return firm, bent
 

@@ -275,3 +275,14 @@ def test_what_bends_a_shape_is_counted_by_itself_and_a_law_beside_it_half(model:
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
     x = problem.start(candidate, None, (2.0, 12.0, 0.08, 0.5, 0.1, 3.0, 0.25, 0.0, 0.5, 0.5, 2e4))
     assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("law", [0.0, 0.35])
+def test_a_share_of_a_shape_at_its_bound_counts_half(model: RigModel, law: float) -> None:
+    """A late command that is taken every 4 ms twice over is one that is 4 ms late: law and other atoms can do it."""
+    parts = (("transport_delay", "rear"), ("transport_delay.shape", "rear"))
+    problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
+    parameters = problem.effect_parameters(candidate)
+    late = {"delay": law * parameters[0].high, "taken": 2.0, "interval": 0.05, "phase": 0.5}
+    x = problem.start(candidate, None, [late.get(p.name, 0.0) for p in parameters])
+    assert at_bounds(problem, Fit(candidate, x, 0.0, np.zeros((1, 6)))) == (0.5, 0.0)
