@@ -153,6 +153,7 @@ def _climb(search: Search, start: Scored, evident: float) -> None:
             if wide is not None and price(wide) < price(current) - worth:
                 search.structures.append(wide)
                 current = wide
+                known[len(wide.candidate.laws)] = price(wide)
         while exchanges and _much_left(search, score(problem, current)):
             other = one_exchanged(search, current)
             exchanges -= 1

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import pytest
 from helpers.own_logs import driven
 from helpers.rig_logs import excitation, signals_of
 
@@ -64,9 +63,13 @@ def test_what_acts_at_one_end_stays_there() -> None:
     assert wide is None or wide.cost > found.cost
 
 
-@pytest.mark.parametrize("site", ["both"])
-def test_what_is_at_both_ends_is_not_widened(site: str) -> None:
-    search = search_of(site)
-    found = found_at(search, site)
-    wide = widened(search, found)
+def test_of_what_acts_at_both_ends_only_the_rest_is_tried() -> None:
+    search = search_of("both")
+    wide = widened(search, found_at(search, "both"))
     assert wide is None or wide.candidate.laws == (("effective_area_error", "both"), ("coulomb_friction", "both"))
+
+
+def test_where_nothing_may_act_at_both_ends_there_is_nothing_to_try() -> None:
+    search = search_of("both")
+    problem, load = search.problem, Candidate((("payload", ""),))
+    assert widened(search, fit(problem, load, problem.start(load, None, [0.0]), iterations=1)) is None
