@@ -27,7 +27,6 @@ FEW: Final = 3  # iterations of a structure without one of its effects [numerics
 FOR_EACH: Final = 4  # exchanges screened for each effect that may be probed [numerics]
 PROBED: Final = 8  # exchanges probed, of all effects together [numerics]
 TINY: Final = 1e-6  # of the misfit: what a share leaves at least [numerics]
-BOTH: Final = "both"  # site of an effect at both ends [definition]
 RIVALS: Final = 2  # families fitted in place of each effect then [numerics]
 
 
@@ -115,7 +114,7 @@ def widened(search: Search, found: Fit) -> Fit | None:
     def probe(law: Part) -> Fit:
         own = of_law(found.candidate, law)
         first = min(map(found.candidate.parts.index, own))
-        candidate = Candidate(tuple((part[0], BOTH) if part in own else part for part in found.candidate.parts))
+        candidate = Candidate(tuple((part[0], "both") if part in own else part for part in found.candidate.parts))
         before = problem.effect_parameters(Candidate(found.candidate.parts[:first]))
         return fit(problem, candidate, whole.x, whole.jacobian, iterations=PROBE, probe=True,
                    shared=problem.fixed + len(before))  # fmt: skip
@@ -131,9 +130,9 @@ def _may_widen(problem: Problem, law: Part) -> bool:
     """Whether a law that acts at one end may act at both with the same parameters."""
     effect = problem.model.effects[law[0]]
     return (
-        law[1] != BOTH
-        and BOTH in effect.sites
-        and len(problem.parameters_of[law]) == len(problem.parameters_of[law[0], BOTH])
+        law[1] != "both"
+        and "both" in effect.sites
+        and len(problem.parameters_of[law]) == len(problem.parameters_of[law[0], "both"])
     )
 
 

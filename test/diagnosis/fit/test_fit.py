@@ -279,7 +279,7 @@ def test_what_bends_a_shape_is_counted_by_itself_and_a_law_beside_it_half(model:
 
 @pytest.mark.parametrize("law", [0.0, 0.35])
 def test_a_share_of_a_shape_at_its_bound_counts_half(model: RigModel, law: float) -> None:
-    """A late command that is taken every 4 ms twice over is one that is 4 ms late: law and other atoms can do it."""
+    """A command that is taken every 50 ms twice over is later by 50 ms in the mean: law and other atoms can do it."""
     parts = (("transport_delay", "rear"), ("transport_delay.shape", "rear"))
     problem, candidate = Problem(model, (log(model, 1),)), Candidate(parts)
     parameters = problem.effect_parameters(candidate)
